@@ -1,0 +1,61 @@
+"""Axisymmetric hyperelastic membranes in a magnetic field: equilibria by energy minimisation, and their stability.
+
+The public names are imported when they are first used, so that ``femmembrane --help`` need not wait for the numerics.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .discretization.meridian import Disc as Disc
+    from .discretization.meridian import disc as disc
+    from .errors import FemmembraneError as FemmembraneError
+    from .errors import InputError as InputError
+    from .errors import SolveError as SolveError
+    from .errors import Status as Status
+    from .physics.magnetics import Dipole as Dipole
+    from .physics.materials import NeoHookean as NeoHookean
+    from .physics.materials import Ogden as Ogden
+    from .results.records import Branch as Branch
+    from .results.records import Equilibrium as Equilibrium
+    from .results.records import SpecialPoint as SpecialPoint
+    from .results.store import load as load
+    from .scene import Analysis as Analysis
+    from .scene import Run as Run
+    from .scene import Scene as Scene
+    from .stability.verdict import Verdict as Verdict
+    from .verbs import equilibrium as equilibrium
+    from .verbs import inflate as inflate
+    from .verbs import pressurize as pressurize
+    from .verbs import run as run
+
+__version__ = "0.1.0"
+
+_ROOMS = {
+    "discretization.meridian": ("Disc", "disc"),
+    "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
+    "physics.magnetics": ("Dipole",),
+    "physics.materials": ("NeoHookean", "Ogden"),
+    "results.records": ("Branch", "Equilibrium", "SpecialPoint"),
+    "results.store": ("load",),
+    "scene": ("Analysis", "Run", "Scene"),
+    "stability.verdict": ("Verdict",),
+    "verbs": ("equilibrium", "inflate", "pressurize", "run"),
+}
+_HOME = {name: room for room, names in _ROOMS.items() for name in names}
+
+__all__ = ["__version__", *sorted(_HOME)]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module("." + _HOME[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

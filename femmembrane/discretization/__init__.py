@@ -1,0 +1,1 @@
+"""Reference meridians and their finite-element spaces; scikit-fem stays behind this wall."""

@@ -1,0 +1,237 @@
+"""Finite-element space on a meridian, as plain arrays.
+
+scikit-fem supplies elements, degrees of freedom, quadrature and the map from the reference element; what leaves this module is NumPy
+only. Unknowns are the coefficients of the displacement (u, w), numbered along the meridian and interleaved, so that every matrix of the
+problem is banded with half bandwidth 2 degree + 1. Points are numbered quadrature point first, element second: with arrays of shape
+(rows * n_quadrature, n_elements) gathering, evaluating and assembling are one matrix product each.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+import skfem
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from skfem.element import ElementLineP1, ElementLineP2, ElementLinePp
+from skfem.quadrature import get_quadrature
+
+from .meridian import Array, Meridian
+
+#: pairs (i, j) of the local variables (u, u_x, w, w_x) in the order of Hessian entries
+HESSIAN_PAIRS: tuple[tuple[int, int], ...] = tuple(combinations_with_replacement(range(4), 2))
+
+
+class Space:
+    """Displacements (u, w) of one degree on one meridian.
+
+    Attributes
+    ----------
+    n_elements, n_quadrature, n_free, half_bandwidth : int
+    R, R_x, Z, Z_x : ndarray, shape (n_quadrature, n_elements)
+        Reference meridian at the quadrature points; _x is the derivative along the reference element [0, 1].
+    weights : ndarray, shape (n_quadrature, n_elements)
+        2 pi times the quadrature weight on the reference element.
+    """
+
+    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None) -> None:
+        self.mesh, self.degree = mesh, degree
+        line = skfem.MeshLine(mesh.breakpoints())
+        element = _line_element(degree)
+        local, n_nodes = _meridian_order(line, element)
+        points, weights = get_quadrature(element, 2 * degree + 1 if quadrature is None else quadrature)
+        self.n_elements, self.n_quadrature = line.nelements, points.shape[1]
+        mapping = line.mapping()
+        self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
+        size = np.diff(mesh.breakpoints())
+        self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
+        self.R_x, self.Z_x = (np.ascontiguousarray(c * size) for c in mesh.tangent(self.s))
+        self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
+
+        self._number(local, n_nodes)
+        self._tabulate(points)
+
+    def _number(self, local: NDArray[np.int64], n_nodes: int) -> None:
+        free = np.ones((n_nodes, 2), dtype=bool)
+        for node, held in zip((0, n_nodes - 1), self.mesh.supports(), strict=True):
+            free[node] &= ["u" not in held, "w" not in held]
+        self.n_free = int(free.sum())
+        # one spare slot past the end stands for all that is held at zero
+        numbers: NDArray[np.int64] = np.full((n_nodes, 2), self.n_free, dtype=np.int64)
+        numbers[free] = np.arange(self.n_free)
+        self.numbers = numbers
+        self.gather = np.concatenate([numbers[local, 0], numbers[local, 1]])
+        self.half_bandwidth = min(2 * self.degree + 1, max(self.n_free - 1, 0))
+        self.fields = tuple(np.sort(column[column < self.n_free]) for column in numbers.T)
+        self.pole = int(numbers[0, 1])
+
+    def _tabulate(self, points: Array) -> None:
+        value, slope = self.shape_functions(points[0])
+        zero = np.zeros_like(value)
+        blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
+        self.table = np.block(blocks)
+        rows = self.table.reshape(4, self.n_quadrature, -1)
+        outer = []
+        for i, j in HESSIAN_PAIRS:
+            product = np.einsum("qa,qb->abq", rows[i], rows[j])
+            outer.append(product if i == j else product + product.transpose(1, 0, 2))
+        n_local = rows.shape[2]
+        self._hessian_table = np.ascontiguousarray(np.stack(outer, axis=2).reshape(n_local**2, -1))
+        # position of each local entry in LAPACK band storage, column by column: A[i, j] at [2 kd + i - j, j]
+        kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
+        i, j = np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :])
+        spare = self.n_free * depth
+        flat = np.where((i < self.n_free) & (j < self.n_free), j * depth + 2 * kd + i - j, spare)
+        self._band_index = flat.reshape(n_local**2, -1).ravel()
+        self._gather_flat = self.gather.ravel()
+
+    def shape_functions(self, xi: Array) -> tuple[Array, Array]:
+        """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
+        element = _line_element(self.degree)  # a new one: ElementLinePp remembers its values by the number of points alone
+        table = [element.lbasis(np.asarray(xi)[None, :], k) for k in _local_order(self.degree)]
+        value = np.stack([t[0] for t in table], axis=1)
+        slope = np.stack([t[1][0] for t in table], axis=1)
+        return value, slope
+
+    def center_height(self, x: Array) -> float:
+        """Height of the first point of the meridian, the pole of a disc."""
+        return float(self.mesh.position(self.mesh.breakpoints()[:1])[1][0] + self.extend(x)[self.pole])
+
+    def extend(self, x: Array) -> Array:
+        """Free coefficients with the zero of the supports appended, so that ``extend(x)[numbers]`` covers all nodes."""
+        return np.append(x, 0.0)
+
+    def at_quadrature(self, x: Array) -> Array:
+        """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
+        return self.table @ self.extend(x)[self.gather]
+
+    def assemble_vector(self, density: Array) -> Array:
+        """Integrate derivatives with respect to (u, u_x, w, w_x), shape (4 n_quadrature, n_elements), against the shape functions."""
+        return _sum_by(self._gather_flat, self.table.T @ density, self.n_free + 1)[: self.n_free]
+
+    def assemble_magnitude(self, density: Array) -> Array:
+        """As :meth:`assemble_vector` for a density >= 0, with no cancellation between shape functions or elements."""
+        return _sum_by(self._gather_flat, np.abs(self.table).T @ density, self.n_free + 1)[: self.n_free]
+
+    def assemble_band(self, density: Array) -> Array:
+        """Integrate second derivatives, shape (10 n_quadrature, n_elements) in the order of HESSIAN_PAIRS.
+
+        Returns
+        -------
+        ndarray, shape (3 kd + 1, n_free), Fortran order
+            LAPACK general band storage with room for the fill of pivoting.
+        """
+        depth = 3 * self.half_bandwidth + 1
+        flat = _sum_by(self._band_index, self._hessian_table @ density, self.n_free * depth + 1)
+        return flat[:-1].reshape(self.n_free, depth).T
+
+    def evaluation_matrix(self) -> sparse.csc_matrix:
+        """The map from free coefficients to (u, u_x, w, w_x) at all points, shape (4 n_points, n_free)."""
+        n_rows, n_local = self.table.shape
+        rows = np.arange(n_rows * self.n_elements).reshape(n_rows, self.n_elements)
+        r = np.broadcast_to(rows[:, None, :], (n_rows, n_local, self.n_elements))
+        c = np.broadcast_to(self.gather[None], r.shape)
+        v = np.broadcast_to(self.table[:, :, None], r.shape)
+        keep = (c < self.n_free) & (v != 0)
+        return sparse.csc_matrix((v[keep], (r[keep], c[keep])), shape=(rows.size, self.n_free))
+
+    def hessian_matrix(self) -> tuple[NDArray[np.int64], NDArray[np.int64], sparse.csc_matrix]:
+        """Assembly of the upper triangle as a linear map of the second derivatives at all points.
+
+        Returns
+        -------
+        rows, columns : ndarray of int, shape (nnz,)
+            Pattern of the upper triangle, in column-major order.
+        matrix : sparse, shape (nnz, 10 n_points)
+        """
+        n_local = self.gather.shape[0]
+        i, j = (a.ravel() for a in np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :]))
+        keep = (i < self.n_free) & (j < self.n_free) & (i <= j)
+        pattern, slot = np.unique(j[keep] * self.n_free + i[keep], return_inverse=True)
+        local, element = (a.ravel()[keep] for a in np.indices((n_local**2, self.n_elements)))
+        points = np.arange(self._hessian_table.shape[1]) * self.n_elements
+        v = self._hessian_table[local]
+        r = np.broadcast_to(slot[:, None], v.shape)
+        c = points[None, :] + element[:, None]
+        nonzero = v != 0
+        matrix = sparse.csc_matrix((v[nonzero], (r[nonzero], c[nonzero])), shape=(pattern.size, 10 * self.s.size))
+        return pattern % self.n_free, pattern // self.n_free, matrix
+
+    def mass_band(self) -> Array:
+        """Mass matrix Int phi.phi 2 pi R dS of the reference area, in band storage."""
+        area = self.weights * self.R * np.hypot(self.R_x, self.Z_x)
+        density = np.zeros((len(HESSIAN_PAIRS), *area.shape))
+        density[HESSIAN_PAIRS.index((0, 0))] = density[HESSIAN_PAIRS.index((2, 2))] = area
+        return self.assemble_band(density.reshape(-1, self.n_elements))
+
+    def interpolate(self, u: Array, w: Array) -> Array:
+        """Free coefficients of the interpolant of displacements given at :meth:`interpolation_points`, both of that shape."""
+        inverse = np.linalg.inv(self.shape_functions(_lobatto(self.degree))[0])
+        x = np.zeros(self.n_free + 1)
+        x[self.gather] = np.concatenate([inverse @ u, inverse @ w])
+        return x[: self.n_free]
+
+    def interpolation_points(self) -> Array:
+        """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""
+        ends = self.mesh.breakpoints()
+        return ends[:-1] + _lobatto(self.degree)[:, None] * np.diff(ends)
+
+    def node_parameters(self) -> Array:
+        """Parameters s of the nodes along the meridian: element ends and degree - 1 points between, shape (degree n_elements + 1,)."""
+        points = self.interpolation_points()
+        return np.append(points[:-1].T.ravel(), points[-1, -1])
+
+    def locate(self, s: ArrayLike) -> tuple[NDArray[np.int64], Array]:
+        """Element and reference coordinate of parameters s."""
+        ends, s = self.mesh.breakpoints(), np.asarray(s, dtype=float)
+        element = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, self.n_elements - 1)
+        return element, (s - ends[element]) / (ends[element + 1] - ends[element])
+
+    def evaluate(self, x: Array, s: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """(u, u_s, w, w_s) at parameters s, slopes with respect to s; at an element end those of the element that starts there."""
+        element, xi = self.locate(s)
+        value, slope = self.shape_functions(xi)
+        coefficients = self.extend(x)[self.gather[:, element]]
+        n_local = self.degree + 1
+        size = np.diff(self.mesh.breakpoints())[element]
+        u, w = (np.einsum("qa,aq->q", value, c) for c in (coefficients[:n_local], coefficients[n_local:]))
+        u_s, w_s = (np.einsum("qa,aq->q", slope, c) / size for c in (coefficients[:n_local], coefficients[n_local:]))
+        return u, u_s, w, w_s
+
+
+@lru_cache(maxsize=32)
+def space_of(mesh: Meridian, degree: int) -> Space:
+    """The space of a mesh and a degree, built once."""
+    return Space(mesh, degree)
+
+
+def _sum_by(index: NDArray[np.int64], values: Array, length: int) -> Array:
+    total: Array = np.bincount(index, values.ravel(), length)  # type: ignore[assignment]  # with weights the counts are floats
+    return total
+
+
+def _line_element(degree: int) -> skfem.Element:
+    special = {1: ElementLineP1, 2: ElementLineP2}
+    return special[degree]() if degree in special else ElementLinePp(degree)
+
+
+def _local_order(degree: int) -> list[int]:
+    """scikit-fem numbers the two ends first; along the meridian the second end comes last."""
+    return [0, *range(2, degree + 1), 1]
+
+
+def _meridian_order(line: skfem.MeshLine, element: skfem.Element) -> tuple[NDArray[np.int64], int]:
+    """Scalar node numbers of each element, increasing along the meridian, shape (degree + 1, n_elements), and their number."""
+    dofs = skfem.Dofs(line, element).element_dofs
+    flat = dofs[_local_order(dofs.shape[0] - 1)].T.ravel()
+    _, first = np.unique(flat, return_index=True)
+    rank = np.empty(first.size, dtype=np.int64)
+    rank[flat[np.sort(first)]] = np.arange(first.size)
+    return rank[flat].reshape(line.nelements, -1).T, first.size
+
+
+def _lobatto(degree: int) -> Array:
+    """Chebyshev-Lobatto points on [0, 1], ends included."""
+    return (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2

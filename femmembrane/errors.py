@@ -1,0 +1,89 @@
+"""What can go wrong, in words that say what to do next.
+
+Two families: :class:`InputError` for a scene that cannot be built, and :class:`SolveError` for a scene that was built but whose
+equilibrium could not be found. Nothing in the library raises a bare exception for either.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from enum import StrEnum
+from typing import Any
+
+
+class Status(StrEnum):
+    """How a solve ended; :attr:`advice` says what to do about it."""
+
+    CONVERGED = "converged"
+    NOT_CONVERGED = "not converged"
+    STEP_UNDERFLOW = "step underflow"
+    NO_EQUILIBRIUM = "no equilibrium"
+    DIPOLE_CONTACT = "dipole contact"
+    NOT_A_MINIMUM = "not a minimum"
+    LEGENDRE_FAILURE = "Legendre condition fails"
+
+    @property
+    def advice(self) -> str:
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Status.CONVERGED: "residual and constraint were recomputed and are at round-off",
+    Status.NOT_CONVERGED: "start nearer (smaller load steps, or start= an equilibrium close by)",
+    Status.STEP_UNDERFLOW: "the branch turns or ends here; follow it by arc length (fm.trace) to see which",
+    Status.NO_EQUILIBRIUM: "no equilibrium was found near this load; the branch turned back before reaching it",
+    Status.DIPOLE_CONTACT: "the membrane runs into a source, where the energy has no lower bound; lower the strength or the load",
+    Status.NOT_A_MINIMUM: "the state balances forces but is no minimum under this control; a minimiser cannot hold it",
+    Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh",
+}
+
+
+class FemmembraneError(Exception):
+    """Base of every error that the package raises on purpose."""
+
+
+class InputError(FemmembraneError, ValueError):
+    """A value in a scene or a call that cannot be used.
+
+    Parameters
+    ----------
+    key : str
+        The argument, as the user wrote it (``mesh.elements``).
+    value : object
+        What was given.
+    allowed : str
+        What would be accepted, in words.
+    """
+
+    def __init__(self, key: str, value: Any, allowed: str) -> None:
+        self.key, self.value, self.allowed = key, value, allowed
+        super().__init__(f"{key} = {_shown(value)}: {allowed}")
+
+
+class SolveError(FemmembraneError, RuntimeError):
+    """An equilibrium that could not be found; carries what was reached.
+
+    Attributes
+    ----------
+    status : Status
+    result : object or None
+        The last good result (an equilibrium, or the branch up to the failure).
+    """
+
+    def __init__(self, message: str, *, status: Status, result: Any = None) -> None:
+        self.status, self.result = status, result
+        super().__init__(message)
+
+
+def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
+    """The error for a name outside a closed set, with the nearest valid one."""
+    known = sorted(known)
+    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.5)
+    hint = f"unknown; did you mean {near[0]!r}? " if near else "unknown; "
+    return InputError(key, name, hint + "known: " + ", ".join(known))
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."

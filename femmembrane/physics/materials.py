@@ -1,0 +1,110 @@
+"""Strain energies of incompressible isotropic membranes.
+
+A material is a function of the two in-plane logarithmic strains e_i = log lambda_i, in units of the ground-state shear modulus::
+
+    W(e_1, e_2),      lambda_i dW/dlambda_i = dW/de_i       the principal mechanical (Cauchy) stresses
+
+It must have W = 0 and dW/de = 0 at rest and shear modulus 1, that is W ~ e_1^2 + e_1 e_2 + e_2^2 to second order times 2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InputError
+
+
+class Material(Protocol):
+    """What the potential asks of a strain energy; works on NumPy arrays and CasADi symbols alike."""
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        """W(e_1, e_2) in units of mu."""
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        """(dW/de_1, dW/de_2) = (lambda_1 W_1, lambda_2 W_2) in units of mu."""
+
+
+@dataclass(frozen=True)
+class Ogden:
+    """Ogden's strain energy with any number of terms (paper eq. 41).
+
+    W = sum_k mu_k/alpha_k (lambda_1^alpha_k + lambda_2^alpha_k + (lambda_1 lambda_2)^-alpha_k - 3)
+
+    Parameters
+    ----------
+    mu, alpha : tuple of float
+        Moduli (in units of the shear modulus) and exponents; each mu_k alpha_k > 0 and their sum is 2.
+
+    Raises
+    ------
+    InputError
+        When the lengths differ, a product is not positive, or the products do not sum to 2.
+    """
+
+    mu: tuple[float, ...]
+    alpha: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for key in ("mu", "alpha"):
+            object.__setattr__(self, key, _numbers(f"material.{key}", getattr(self, key)))
+        if len(self.mu) != len(self.alpha):
+            raise InputError("material.alpha", self.alpha, f"as many exponents as moduli are allowed ({len(self.mu)} in material.mu)")
+        products = [m * a for m, a in zip(self.mu, self.alpha, strict=True)]
+        for k, product in enumerate(products):
+            if not product > 0:
+                raise InputError(
+                    f"material.mu[{k}]",
+                    self.mu[k],
+                    f"mu alpha > 0 is required of every term; mu must have the sign of alpha = {self.alpha[k]!r}",
+                )
+        if not abs(sum(products) - 2) <= 1e-6:
+            raise InputError(
+                "material.mu",
+                self.mu,
+                f"the sum of mu alpha must be 2 (shear modulus 1), not {sum(products):.9g}; divide mu by {sum(products) / 2:.9g}",
+            )
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        # p + q + r cancels to second order in the strain; the product form keeps all digits (r = (1 + p)^-1 (1 + q)^-1 - 1)
+        total = 0.0
+        for mu, alpha in zip(self.mu, self.alpha, strict=True):
+            p, q, r = _powers(alpha, e1, e2)
+            total = total + mu / alpha * (p * p + p * q + q * q + p * q * (p + q)) * (1 + r)
+        return total
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        s1 = s2 = 0.0
+        for mu, alpha in zip(self.mu, self.alpha, strict=True):
+            p, q, r = _powers(alpha, e1, e2)
+            s1, s2 = s1 + mu * (p - r), s2 + mu * (q - r)
+        return s1, s2
+
+
+@dataclass(frozen=True)
+class NeoHookean:
+    """Neo-Hookean strain energy W = (lambda_1^2 + lambda_2^2 + lambda_3^2 - 3)/2: Ogden's with one term, mu = 1 and alpha = 2."""
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        return Ogden((1.0,), (2.0,)).energy(e1, e2)
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        return Ogden((1.0,), (2.0,)).stress(e1, e2)
+
+
+def _powers(alpha: float, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+    """lambda_i^alpha - 1 for the three principal stretches."""
+    return np.expm1(alpha * e1), np.expm1(alpha * e2), np.expm1(-alpha * (e1 + e2))
+
+
+def _numbers(key: str, values: Any) -> tuple[float, ...]:
+    try:
+        result = tuple(float(v) for v in values)
+    except (TypeError, ValueError):
+        raise InputError(key, values, "a list of numbers is allowed") from None
+    if not result or not all(math.isfinite(v) for v in result):
+        raise InputError(key, values, "one or more finite numbers are allowed")
+    return result

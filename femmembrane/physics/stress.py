@@ -1,0 +1,41 @@
+"""Principal Cauchy stresses of the membrane, in units of the shear modulus (paper eqs. 46-56).
+
+Mechanical: lambda_i W_i, what the strain energy feels. Total: with the inflating pressure through the thickness and the Maxwell and
+magnetisation stresses, ::
+
+    s_11 = lambda_1 W_1 - P T/R0 + (chi + 1/2) (h_t^2 - h_n^2)
+    s_22 = lambda_2 W_2 - P T/R0 - (h_t^2 + h_n^2)/2 - chi h_n^2
+
+where (h_t, h_n) are the components of the magnetic field along the meridian and the normal.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def total_stress(
+    mechanical: tuple[Any, Any],
+    pressure: float,
+    radius_to_thickness: float,
+    field: tuple[Any, Any],
+    tangent: tuple[Any, Any],
+    susceptibility: float,
+) -> tuple[Any, Any]:
+    """Total principal stresses (s_11, s_22).
+
+    Parameters
+    ----------
+    mechanical : (lambda_1 W_1, lambda_2 W_2)
+    pressure : P = p R0/(mu T)
+    radius_to_thickness : R0/T
+    field : (h_rho, h_z) in units of sqrt(mu/mu0), strengths included
+    tangent : unit tangent (t_rho, t_z) of the deformed meridian
+    susceptibility : chi
+    """
+    h_t = field[0] * tangent[0] + field[1] * tangent[1]
+    h_n = field[1] * tangent[0] - field[0] * tangent[1]
+    through = pressure / radius_to_thickness
+    s11 = mechanical[0] - through + (susceptibility + 0.5) * (h_t**2 - h_n**2)
+    s22 = mechanical[1] - through - (h_t**2 + h_n**2) / 2 - susceptibility * h_n**2
+    return s11, s22

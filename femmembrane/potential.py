@@ -1,0 +1,364 @@
+"""The total potential of a scene on its finite-element space, with exact derivatives.
+
+Only the terms that the scene has are written down, as one CasADi expression at a point in the local variables (u, u_x, w, w_x)::
+
+    E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS],       V = Int rho rho_x eta dx,       both with the 2 pi
+
+CasADi differentiates it twice, and the instructions of the result are replayed on whole vectors of points, which costs a small part of
+mapping the scalar function over them. Assembly is a constant linear map of the values at the points (:mod:`.discretization.space`), the
+same for the Newton corrector (NumPy arrays, banded) and for IPOPT (CasADi functions, sparse).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from .discretization.space import HESSIAN_PAIRS, Space, space_of
+from .physics.kinematics import hencky_strains
+from .physics.loads import volume_density
+from .physics.magnetics import magnetic_energy_density
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+Array = NDArray[np.float64]
+
+#: points evaluated in one go; larger vectors leave the processor's cache
+_BLOCK = 1024
+
+
+@dataclass(slots=True)
+class Evaluation:
+    """Value, gradient and Hessian of E and V at one state; energies and volume with the 2 pi.
+
+    ``band`` holds E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free); ``stress`` the principal mechanical stresses at the
+    quadrature points, shape (2, n_points); ``force_density`` what was integrated to the two gradients, for judging a residual.
+    """
+
+    elastic_energy: float
+    magnetic_energy: float
+    volume: float
+    gradient: Array
+    volume_gradient: Array
+    band: Array
+    stress: Array
+    force_density: Array
+
+    @property
+    def energy(self) -> float:
+        return self.elastic_energy + self.magnetic_energy
+
+
+class Potential:
+    """Discrete potential of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    quadrature : int, optional
+        Polynomial degree integrated exactly; default 2 degree + 1.
+    """
+
+    def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
+        self.scene = scene
+        self.space = space_of(scene.mesh, scene.degree) if quadrature is None else Space(scene.mesh, scene.degree, quadrature)
+        space = self.space
+        self.sources = scene.sources if scene.susceptibility else ()
+        self._flat = not (space.Z.any() or space.Z_x.any())
+        columns = [space.R, space.R_x, space.weights] if self._flat else [space.R, space.R_x, space.weights, space.Z, space.Z_x]
+        self.point_data: Array = np.stack([c.ravel() for c in columns])
+        with _casadi_answers_numpy():
+            self._symbols, self._terms = _point_expressions(scene, self._flat)
+        self.n_points = self.point_data.shape[1]
+
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrix of the reference area in band storage, shape (3 kd + 1, n_free)."""
+        return self.space.mass_band()
+
+    @cached_property
+    def area(self) -> float:
+        """Reference area of the membrane."""
+        space = self.space
+        return float((space.weights * space.R * np.hypot(space.R_x, space.Z_x)).sum())
+
+    @cached_property
+    def point_function(self) -> ca.Function:
+        """(data, local variables, (P, magnetic factor)) -> values, gradients and the Hessian at one point."""
+        t, (data, local, parameters) = self._terms, self._symbols
+        hessian = ca.jacobian(t["gradient"] - parameters[0] * t["volume_gradient"], local)
+        rows = [
+            t["elastic"],
+            t["magnetic"],
+            t["volume"],
+            t["gradient"],
+            t["volume_gradient"],
+            *(hessian[i, j] for i, j in HESSIAN_PAIRS),
+            t["stress"],
+        ]
+        return ca.Function("point", [data, local, parameters], [ca.densify(ca.vertcat(*rows))], {"cse": True})
+
+    @property
+    def operations(self) -> int:
+        """Number of elementary operations that one point costs: terms that the scene lacks do not appear."""
+        return int(self.point_function.n_instructions())
+
+    @cached_property
+    def _kernel(self) -> _Kernel:
+        return _Kernel(self.point_function, self.point_data)
+
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales the magnetic energy."""
+        space = self.space
+        out = self._kernel(space.at_quadrature(x), np.array([pressure, magnetic]))
+        if not np.isfinite(out).all():
+            return self._undefined()
+        e, m, v = out[:3].sum(axis=1)
+        ne = space.n_elements
+        return Evaluation(
+            float(e),
+            float(m),
+            float(v),
+            space.assemble_vector(out[3:7].reshape(-1, ne)),
+            space.assemble_vector(out[7:11].reshape(-1, ne)),
+            space.assemble_band(out[11:21].reshape(-1, ne)),
+            out[21:23].copy(),
+            out[3:11].copy(),
+        )
+
+    def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[Array, ...]:
+        """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
+        space = self.space
+        elastic, volume = (np.abs(d).reshape(-1, space.n_elements) for d in (evaluation.force_density[:4], evaluation.force_density[4:]))
+        total = space.assemble_magnitude(elastic) + abs(pressure) * space.assemble_magnitude(volume)
+        return tuple(total[index].max(initial=0.0) for index in space.fields)
+
+    def _undefined(self) -> Evaluation:
+        """Outside the domain of the energy: a fold of the meridian onto itself, a radius past the axis, a source."""
+        n, depth = self.space.n_free, 3 * self.space.half_bandwidth + 1
+        nan = np.full(n, np.nan)
+        stress, density = np.full((2, self.n_points), np.nan), np.full((8, self.n_points), np.nan)
+        return Evaluation(np.nan, np.nan, np.nan, nan, nan, np.full((depth, n), np.nan, order="F"), stress, density)
+
+    def response(self, e1: Array, e2: Array) -> Array:
+        """Principal mechanical stresses and their derivatives with respect to the Hencky strains.
+
+        Returns
+        -------
+        ndarray, shape (5, n)
+            s_1, s_2, ds_1/de_1, ds_1/de_2, ds_2/de_2 in units of mu.
+        """
+        with _casadi_answers_numpy():
+            e = ca.SX.sym("e", 2)
+            s = ca.vertcat(*self.scene.material.stress(e[0], e[1]))
+            tangent = ca.jacobian(s, e)
+        return _at_points([e], [s, tangent[0, 0], tangent[0, 1], tangent[1, 1]], e1, e2)
+
+    def field_energy(self, rho: Array, eta: Array) -> Array:
+        """Magnetic energy density per reference area and its derivatives with respect to the position.
+
+        Returns
+        -------
+        ndarray, shape (6, n)
+            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources.
+        """
+        if not self.sources:
+            return np.zeros((6, np.size(rho)))
+        with _casadi_answers_numpy():
+            y = ca.SX.sym("y", 2)
+            density = magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
+            hessian, gradient = ca.hessian(density, y)
+        return _at_points([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]], rho, eta)
+
+    @cached_property
+    def nlp(self) -> NlpFunctions:
+        """The same potential as CasADi functions of all unknowns, for IPOPT."""
+        return _nlp_functions(self)
+
+
+@dataclass(frozen=True)
+class NlpFunctions:
+    """E - P V under a scaling of the unknowns, x = scale_u y_u and x = scale_w y_w, as CasADi functions for ``nlpsol``.
+
+    Parameters ``p`` of all: (P, magnetic factor, scale of u, of w, of the objective, of the volume).
+    """
+
+    value: ca.Function
+    gradient: ca.Function
+    hessian: ca.Function
+    volume: ca.Function
+    volume_gradient: ca.Function
+    sparsity: ca.Sparsity
+
+
+class _Kernel:
+    """A point function replayed on vectors of points, called through preallocated buffers."""
+
+    def __init__(self, function: ca.Function, data: Array) -> None:
+        n = data.shape[1]
+        self.block = min(n, _BLOCK)
+        self.n_blocks = -(-n // self.block)
+        self.n, self.rows = n, function.numel_out(0)
+        vector = vectorise(function, self.block)
+        if self.n_blocks > 1:
+            vector = vector.map("blocks", "serial", self.n_blocks, [2], [])
+        self._data = self._split(data)
+        self._local = np.ones((self.n_blocks, function.numel_in(1), self.block))
+        self._parameters = np.zeros(function.numel_in(2))
+        self._out = np.zeros((self.n_blocks, self.rows, self.block))
+        self._buffer, self._call = vector.buffer()
+        for k, array in enumerate((self._data, self._local, self._parameters)):
+            self._buffer.set_arg(k, memoryview(array))
+        self._buffer.set_res(0, memoryview(self._out))
+
+    def _split(self, rows: Array) -> Array:
+        """(rows, n) -> (n_blocks, rows, block), the last block filled up with its own last point."""
+        padded = np.pad(rows, ((0, 0), (0, self.n_blocks * self.block - self.n)), mode="edge")
+        return np.ascontiguousarray(padded.reshape(len(rows), self.n_blocks, self.block).transpose(1, 0, 2))
+
+    def __call__(self, local: Array, parameters: Array) -> Array:
+        """Values at all points, shape (rows, n); valid until the next call."""
+        local = local.reshape(-1, self.n)
+        self._local[...] = local if self.n_blocks == 1 else self._split(local)
+        self._parameters[:] = parameters
+        self._call()
+        if self.n_blocks == 1:
+            return self._out[0]
+        return self._out.transpose(1, 0, 2).reshape(self.rows, -1)[:, : self.n]
+
+
+def vectorise(function: ca.Function, n: int) -> ca.Function:
+    """Replay the instructions of a scalar function on vectors of n points.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Expanded to scalars; its last input is shared by all points, its one output is a dense column.
+
+    Returns
+    -------
+    casadi.Function
+        Inputs of shape (n, rows) (the last one unchanged), output of shape (n, rows): row by row contiguous in memory.
+    """
+    last = function.n_in() - 1
+    arguments = [ca.MX.sym(function.name_in(k), n if k < last else 1, function.numel_in(k)) for k in range(last + 1)]
+    work: dict[int, ca.MX] = {}
+    outputs: dict[int, ca.MX] = {}
+    for k in range(function.n_instructions()):
+        operation, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+        if operation == ca.OP_CONST:
+            work[target[0]] = ca.MX(function.instruction_constant(k))
+        elif operation == ca.OP_INPUT:
+            work[target[0]] = arguments[source[0]][:, source[1]]
+        elif operation == ca.OP_OUTPUT:
+            outputs[target[1]] = work[source[0]]
+        elif len(source) == 1:
+            work[target[0]] = ca.MX.unary(operation, work[source[0]])
+        else:
+            work[target[0]] = ca.MX.binary(operation, work[source[0]], work[source[1]])
+    columns = [c if c.numel() == n else ca.repmat(c, n, 1) for c in (outputs[k] for k in range(function.numel_out(0)))]
+    return ca.Function(function.name() + "_vector", arguments, [ca.densify(ca.horzcat(*columns))])
+
+
+def potential_of(scene: Scene) -> Potential:
+    """The potential of a scene, built once: scenes that differ only in what is done with it share one."""
+    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0))
+
+
+@lru_cache(maxsize=64)
+def _potential_of(scene: Scene) -> Potential:
+    return Potential(scene)
+
+
+def _nlp_functions(potential: Potential) -> NlpFunctions:
+    space, n = potential.space, potential.n_points
+    y, p = ca.MX.sym("y", space.n_free), ca.MX.sym("p", 6)
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g")
+    is_u = np.zeros(space.n_free)
+    is_u[space.fields[0]] = 1.0
+    scale = is_u * p[2] + (1 - is_u) * p[3]
+    local = ca.reshape(ca.mtimes(ca.DM(space.evaluation_matrix()), scale * y), n, 4)
+    data = ca.DM(potential.point_data.T)
+
+    def assembled(function: ca.Function, parameters: ca.MX) -> ca.MX:
+        return vectorise(function, n)(data, local, parameters)
+
+    plain = ca.vertcat(0.0, p[1])
+    t, symbols = potential._terms, list(potential._symbols)
+    values = assembled(
+        ca.Function("values", symbols, [ca.densify(ca.vertcat(t["elastic"] + t["magnetic"], t["volume"]))], {"cse": True}), plain
+    )
+    gradients = assembled(
+        ca.Function("gradients", symbols, [ca.densify(ca.vertcat(t["gradient"], t["volume_gradient"]))], {"cse": True}), plain
+    )
+    integrate = ca.DM(space.evaluation_matrix().T)
+    e_x, v_x = (scale * ca.mtimes(integrate, ca.vec(gradients[:, k : k + 4])) for k in (0, 4))
+    energy, volume = ca.sum1(values[:, 0]), ca.sum1(values[:, 1])
+    rows, columns, integrator = space.hessian_matrix()
+    # the Lagrangian lam_f (E - P V)/objective + lam_g V/volume has the Hessian of E - q V with this q
+    multiplier = p[0] - lam_g / lam_f * p[4] / p[5]
+    second = assembled(potential.point_function, ca.vertcat(multiplier, p[1]))[:, 11:21]
+    entries = ca.mtimes(ca.DM(integrator), ca.vec(second)) * (scale[rows] * scale[columns]) * (lam_f / p[4])
+    sparsity = ca.Sparsity.triplet(space.n_free, space.n_free, rows, columns)
+    hessian = ca.MX(sparsity, entries)
+    f = (energy - p[0] * volume) / p[4]
+    return NlpFunctions(
+        value=ca.Function("nlp_f", [y, p], [f]),
+        gradient=ca.Function("nlp_grad_f", [y, p], [f, (e_x - p[0] * v_x) / p[4]]),
+        hessian=ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [hessian]),
+        volume=ca.Function("nlp_g", [y, p], [volume / p[5]]),
+        volume_gradient=ca.Function("nlp_jac_g", [y, p], [volume / p[5], v_x.T / p[5]]),
+        sparsity=sparsity,
+    )
+
+
+def _point_expressions(scene: Scene, flat: bool) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
+    """Symbols (data, local, parameters) and the weighted densities with their gradients at one point."""
+    data = ca.SX.sym("data", 3 if flat else 5)
+    local = ca.SX.sym("local", 4)
+    parameters = ca.SX.sym("parameters", 2)
+    R, R_x, weight, Z, Z_x = (data[k] if k < data.numel() else ca.SX(0) for k in range(5))
+    u, u_x, w, w_x = (local[k] for k in range(4))
+    e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
+    area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
+    s1, s2 = scene.material.stress(e1, e2)
+    # the chain rule through closed-form stresses keeps the digits that differentiating the energy would lose at small strain
+    gradient = area * (s1 * ca.gradient(e1, local) + s2 * ca.gradient(e2, local))
+    volume = weight * volume_density(R + u, R_x + u_x, Z + w)
+    magnetic = ca.SX(0)
+    if scene.sources and scene.susceptibility:
+        magnetic = area * magnetic_energy_density(scene.sources, scene.susceptibility, R + u, Z + w)
+        gradient = gradient + parameters[1] * ca.gradient(magnetic, local)
+        magnetic = parameters[1] * magnetic
+    return (data, local, parameters), {
+        "elastic": area * scene.material.energy(e1, e2),
+        "magnetic": magnetic,
+        "volume": volume,
+        "gradient": gradient,
+        "volume_gradient": ca.gradient(volume, local),
+        "stress": ca.vertcat(s1, s2),
+    }
+
+
+def _at_points(symbols: list[ca.SX], rows: list[ca.SX], *columns: Array) -> Array:
+    function = ca.Function("at_points", symbols, [ca.densify(ca.vertcat(*rows))], {"cse": True})
+    return np.asarray(function.map(np.size(columns[0]))(np.stack([np.ravel(c) for c in columns])))
+
+
+@contextmanager
+def _casadi_answers_numpy() -> Iterator[None]:
+    """Let NumPy's ufuncs act on CasADi symbols here without changing the caller's setting."""
+    before = ca.GlobalOptions.getNumpyMode()
+    ca.GlobalOptions.setNumpyMode(1)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setNumpyMode(before)

@@ -1,0 +1,1 @@
+"""What a computation leaves behind: records in memory, tables and files on disk."""

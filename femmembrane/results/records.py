@@ -1,0 +1,272 @@
+"""Frozen records of what was computed: equilibria, special points and branches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError, Status, unknown_name
+from ..physics.kinematics import meridional_strain
+from ..physics.magnetics import magnetic_field
+from ..physics.stress import total_stress
+from ..threads import one_thread
+
+if TYPE_CHECKING:
+    from ..potential import Potential
+    from ..scene import Scene
+    from ..stability.verdict import Verdict
+
+Array = NDArray[np.float64]
+
+#: classes of perturbations shown by ``print(branch)`` when the scene asks for none
+_SHOWN = ("pressure", "volume")
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """One equilibrium of a scene.
+
+    Attributes
+    ----------
+    pressure : float
+        P = p R0/(mu T).
+    volume : float
+        Enclosed volume over R0^3, signed, with the 2 pi.
+    center_height : float
+        Height of the pole over R0.
+    elastic_energy, magnetic_energy : float
+        In units of mu T R0^2, with the 2 pi; the magnetic one is 0 without sources.
+    residual : float
+        Largest out-of-balance force relative to the forces that meet at a node, recomputed after the solve.
+    iterations : int
+        Iterations spent on this equilibrium, rejected attempts included.
+    status : Status
+    scene : Scene
+    state : ndarray, shape (n_free,)
+        Displacement coefficients of the free degrees of freedom (read-only).
+    seconds : float
+        Wall time spent on this equilibrium and its verdicts.
+    """
+
+    pressure: float
+    volume: float
+    center_height: float
+    elastic_energy: float
+    magnetic_energy: float
+    residual: float
+    iterations: int
+    status: Status
+    scene: Scene = field(repr=False)
+    state: Array = field(repr=False)
+    seconds: float = field(default=0.0, repr=False)
+    _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
+
+    @property
+    def energy(self) -> float:
+        """Elastic plus magnetic energy."""
+        return self.elastic_energy + self.magnetic_energy
+
+    @property
+    def potential(self) -> Potential:
+        """The discrete potential this state lives in (built once per scene)."""
+        from ..potential import potential_of
+
+        return potential_of(self.scene)
+
+    def profile(self, r: ArrayLike | None = None) -> dict[str, Array]:
+        """The deformed meridian with stretches and stresses.
+
+        Parameters
+        ----------
+        r : array_like, optional
+            Reference radii in [0, 1]; default the nodes, from the pole to the rim.
+
+        Returns
+        -------
+        dict of ndarray
+            r, rho, eta (over R0); stretch_1, stretch_2 (1 meridional, 2 circumferential); mechanical_stress_1, mechanical_stress_2,
+            total_stress_1, total_stress_2 (Cauchy, in units of mu).
+
+        Raises
+        ------
+        InputError
+            For radii outside the membrane.
+        """
+        space = self.potential.space
+        s = space.node_parameters() if r is None else _radii(r, space.mesh.breakpoints())
+        return _profile(self, s)
+
+    @one_thread
+    def verdict(self, control: str | None = None, *, azimuthal: int = 0) -> Verdict:
+        """Stability under a control ("pressure" or "volume") against axisymmetric perturbations; computed once and remembered.
+
+        Raises
+        ------
+        InputError
+            For an unknown control.
+        """
+        key = (control, azimuthal)
+        if key not in self._verdicts:
+            from ..stability.verdict import axisymmetric_verdict
+
+            if control is None:
+                raise InputError("control", control, '"pressure" or "volume" is allowed')
+            evaluation = self.potential.evaluate(self.state, self.pressure)
+            self._verdicts[key] = axisymmetric_verdict(self.potential, evaluation, control)
+        return self._verdicts[key]
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A point of a branch where something changes.
+
+    Attributes
+    ----------
+    kind : str
+        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point.
+    volume, pressure, center_height : float
+    error : float
+        Estimated distance, relative, of the located point from the exact one of the discrete branch.
+    equilibrium : Equilibrium
+    """
+
+    kind: str
+    volume: float
+    pressure: float
+    center_height: float
+    error: float
+    equilibrium: Equilibrium = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Branch(Sequence[Equilibrium]):
+    """Equilibria in the order in which they were found.
+
+    Attributes
+    ----------
+    scene : Scene
+    equilibria : tuple of Equilibrium
+    status : Status
+        How the run ended; with a ``message`` unless all went well.
+    timings : mapping of str to float
+        Seconds by stage.
+    special_points : tuple of SpecialPoint, or None when none were looked for
+    """
+
+    scene: Scene
+    equilibria: tuple[Equilibrium, ...]
+    status: Status = Status.CONVERGED
+    message: str = ""
+    timings: Mapping[str, float] = field(default_factory=dict)
+    special_points: tuple[SpecialPoint, ...] | None = None
+
+    def __len__(self) -> int:
+        return len(self.equilibria)
+
+    @overload
+    def __getitem__(self, index: int) -> Equilibrium: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Branch: ...
+
+    def __getitem__(self, index: int | slice) -> Equilibrium | Branch:
+        if isinstance(index, slice):
+            return replace(self, equilibria=self.equilibria[index])
+        return self.equilibria[index]
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return iter(self.equilibria)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """One column of the table as an array: step, an attribute of :class:`Equilibrium`, or lambda_/verdict_ with pressure, volume."""
+        if name == "step":
+            return np.arange(len(self))
+        kind, _, control = name.partition("_")
+        if kind == "lambda" and control in _SHOWN:
+            return np.array([eq.verdict(control).smallest_eigenvalue for eq in self])
+        if kind == "verdict" and control in _SHOWN:
+            return np.array([eq.verdict(control).word for eq in self])
+        known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
+        if name not in known:
+            raise unknown_name("column", name, ("step", *known, *(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN)))
+        return np.array([getattr(eq, name) for eq in self])
+
+    def __str__(self) -> str:
+        classes = self.scene.analysis.stability or _SHOWN
+        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {'under ' + c:<14}" for c in classes)
+        lines = [self.scene.title, head] if self.scene.title else [head]
+        for k, eq in enumerate(self):
+            numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
+            lines.append(numbers + "".join(f"  {eq.verdict(c).word:<14}" for c in classes))
+        if self.message:
+            lines.append(self.message)
+        return "\n".join(line.rstrip() for line in lines)
+
+    def to_dataframe(self) -> Any:
+        """The table as a pandas DataFrame."""
+        from .table import to_dataframe
+
+        return to_dataframe(self)
+
+    def to_xarray(self) -> Any:
+        """Table, profiles and states as an xarray Dataset with units and long names."""
+        from .store import to_xarray
+
+        return to_xarray(self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write everything to one NetCDF file; :func:`femmembrane.load` reads it back."""
+        from .store import save
+
+        save(self, path)
+
+    def to_vtk(self, path: str | PathLike[str]) -> None:
+        """Write a ParaView collection (.pvd) with one VTU file a step."""
+        from ..views.vtk import write_vtk
+
+        write_vtk(self, path)
+
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Pressure against volume as a Matplotlib figure, also written to ``path`` if given."""
+        from ..views.plots import plot_pressure_volume
+
+        return plot_pressure_volume(self, path)
+
+
+def _radii(r: ArrayLike, ends: Array) -> Array:
+    s = np.atleast_1d(np.asarray(r, dtype=float))
+    if not ((s >= ends[0]) & (s <= ends[-1])).all():
+        raise InputError("r", r, f"reference radii in [{ends[0]:g}, {ends[-1]:g}] are allowed")
+    return s
+
+
+def _profile(eq: Equilibrium, s: Array) -> dict[str, Array]:
+    scene, space = eq.scene, eq.potential.space
+    u, u_s, w, w_s = space.evaluate(eq.state, s)
+    (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
+    pole = R == 0  # there u/R is the limit u_s/R_s
+    e1 = meridional_strain(R_s, Z_s, u_s, w_s)
+    e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
+    rho, eta = R + u, Z + w
+    mechanical = scene.material.stress(e1, e2)
+    sources = scene.sources
+    h = magnetic_field(sources, rho, eta) if sources else (0.0, 0.0)
+    slope = np.hypot(R_s + u_s, Z_s + w_s)
+    tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
+    total = total_stress(mechanical, eq.pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
+    return {
+        "r": R,
+        "rho": rho,
+        "eta": eta,
+        "stretch_1": np.exp(e1),
+        "stretch_2": np.exp(e2),
+        "mechanical_stress_1": mechanical[0],
+        "mechanical_stress_2": mechanical[1],
+        "total_stress_1": total[0],
+        "total_stress_2": total[1],
+    }

@@ -1,0 +1,141 @@
+"""Banded linear algebra (LAPACK) for the matrices of one meridian, bordered by one row and one column."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import blas, lapack
+from scipy.sparse.linalg import splu
+
+from ..potential import Array
+
+
+class BandFactor:
+    """LU factors of a band matrix in LAPACK general storage, shape (3 kd + 1, n), with partial pivoting."""
+
+    def __init__(self, band: Array, half_bandwidth: int) -> None:
+        self.kd = half_bandwidth
+        self._lu, self._pivots, info = lapack.dgbtrf(band, half_bandwidth, half_bandwidth)
+        if info > 0:  # an exact zero pivot: perturbed at round-off, as inverse iteration does; the bordered solve stays well defined
+            diagonal = self._lu[2 * half_bandwidth]
+            diagonal[diagonal == 0] = np.finfo(float).eps * (np.abs(band).max() or 1.0)
+
+    def solve(self, right: Array) -> Array:
+        """Solution for one or several right-hand sides, shape (n,) or (n, k)."""
+        solution, _ = lapack.dgbtrs(self._lu, self.kd, self.kd, right, self._pivots)
+        return solution
+
+
+class BorderedFactor:
+    """Solver for a symmetric band matrix K with one border::
+
+        [ K   column ] [ x ]   [ f ]
+        [ row^T   d  ] [ y ] = [ g ]
+
+    Mixed block elimination (Govaerts and Pryce, 1993): backward stable even where K itself is singular, as it is at a limit point, at
+    the price of one further solve with the factors of K.
+    """
+
+    def __init__(self, factor: BandFactor, column: Array, row: Array, corner: float) -> None:
+        self._factor, self._column, self._row, self._corner = factor, column, row, corner
+        both = factor.solve(np.stack([row, column], axis=1))
+        self._v, self._w = both[:, 0], both[:, 1]
+        self._delta_v = corner - self._v @ column
+        self._delta_w = corner - row @ self._w
+
+    def solve(self, f: Array, g: float) -> tuple[Array, float]:
+        first = (g - self._v @ f) / self._delta_v
+        rest = self._factor.solve(f - first * self._column)
+        second = (g - self._corner * first - self._row @ rest) / self._delta_w
+        return rest - second * self._w, float(first + second)
+
+
+def band_product(band: Array, half_bandwidth: int, x: Array) -> Array:
+    """Symmetric band matrix in LAPACK general storage times a vector."""
+    return blas.dsbmv(half_bandwidth, 1.0, band[half_bandwidth : 2 * half_bandwidth + 1], x)
+
+
+def cholesky_exists(band: Array, half_bandwidth: int) -> bool:
+    """Whether a symmetric band matrix in LAPACK general storage is positive definite."""
+    _, info = lapack.dpbtrf(band[half_bandwidth : 2 * half_bandwidth + 1])
+    return bool(info == 0)
+
+
+def negative_directions(band: Array, half_bandwidth: int, constraint: Array | None = None) -> int:
+    """Number of negative eigenvalues of a symmetric band matrix, or of its restriction to ``constraint . x = 0``.
+
+    An exact count, not a partial spectrum: a few unknowns are pinned until the rest is positive definite (Cholesky), and the count is
+    that of the Schur complement on the pinned ones (Haynsworth's inertia additivity, a block L D L^T). A constraint is one more border
+    with a zero corner; it carries one negative direction of its own.
+
+    Parameters
+    ----------
+    band : ndarray, shape (3 kd + 1, n)
+        LAPACK general band storage.
+    half_bandwidth : int
+    constraint : ndarray, shape (n,), optional
+    """
+    n, kd = band.shape[1], half_bandwidth
+    upper = band[kd : 2 * kd + 1]
+    borders = np.zeros((n, 0)) if constraint is None else constraint[:, None]
+    for count in (0, 4, 16, 64, 256, 1024):
+        pins = _spread(n, count)
+        pinned = _pin(upper, pins)
+        factor, info = lapack.dpbtrf(pinned)
+        if info == 0:
+            coupling = _columns(band, kd, pins)
+            corner = coupling[pins].copy()
+            coupling[pins] = 0.0
+            free = borders.copy()
+            free[pins] = 0.0
+            right = np.concatenate([coupling, free], axis=1)
+            if right.shape[1] == 0:
+                return 0
+            schur = -right.T @ lapack.dpbtrs(factor, right)[0]
+            k = len(pins)
+            schur[:k, :k] += corner
+            schur[:k, k:] += borders[pins]
+            schur[k:, :k] += borders[pins].T
+            return int((np.linalg.eigvalsh(schur) < 0).sum()) - borders.shape[1]
+        if count >= n:
+            break
+    return _sparse_count(band, kd, constraint)
+
+
+def _spread(n: int, count: int) -> np.ndarray:
+    """Unknowns to pin, spread evenly; the first ones belong to the pole."""
+    return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
+
+
+def _pin(upper: Array, pins: np.ndarray) -> Array:
+    """Upper band storage with the rows and columns of the pins replaced by those of the identity."""
+    if not len(pins):
+        return upper
+    pinned, kd = upper.copy(order="F"), upper.shape[0] - 1
+    pinned[:, pins] = 0.0
+    for offset in range(1, kd + 1):
+        right = pins + offset
+        pinned[kd - offset, right[right < upper.shape[1]]] = 0.0
+    pinned[kd, pins] = 1.0
+    return pinned
+
+
+def _columns(band: Array, kd: int, pins: np.ndarray) -> Array:
+    """Dense columns of a band matrix."""
+    n = band.shape[1]
+    dense = np.zeros((n, len(pins)))
+    for k, j in enumerate(pins):
+        low, high = max(0, j - kd), min(n, j + kd + 1)
+        dense[low:high, k] = band[2 * kd + low - j : 2 * kd + high - j, j]
+    return dense
+
+
+def _sparse_count(band: Array, kd: int, constraint: Array | None) -> int:
+    """Count by sparse L D L^T without pivoting, for matrices with very many negative directions."""
+    n = band.shape[1]
+    matrix = sparse.dia_array((band[kd:], np.arange(kd, -kd - 1, -1)), shape=(n, n)).tocsc()
+    lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    count = int((lu.U.diagonal() < 0).sum())
+    if constraint is None:
+        return count
+    return count + int(-constraint @ lu.solve(constraint) < 0) - 1

@@ -1,0 +1,144 @@
+"""Pseudo-arc-length continuation: whole branches, stable or not, through limit points and folds.
+
+Arc length is measured in the mesh-independent inner product of :func:`.state.inner` (mean square displacement over the reference area plus
+squared pressure), so that a step means the same on every mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..potential import Array, Potential
+from .banded import BorderedFactor, band_product
+from .controls import ArcLengthControl
+from .newton import correct
+from .state import Path, State, inner
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """How long the steps along a branch are.
+
+    Attributes
+    ----------
+    first, smallest, largest : float
+        Arc length of the first step and its limits.
+    deviation : float
+        Wanted distance between prediction and corrected point, relative to the step.
+    turn : float
+        Largest angle between neighbouring tangents, in radians.
+    """
+
+    first: float = 0.02
+    smallest: float = 1e-7
+    largest: float = 0.5
+    deviation: float = 2e-3
+    turn: float = 0.35
+
+
+@dataclass(slots=True)
+class BranchPoint:
+    """A point of a branch with its unit tangent and the rates of volume, pressure and pole height along it."""
+
+    state: State
+    sigma: float
+    tangent: Array
+    tangent_pressure: float
+    dual: Array
+
+    def rate(self, quantity: str, potential: Potential) -> float:
+        """Derivative of volume, pressure or center_height with respect to arc length: zero at a fold in that quantity."""
+        if quantity == "pressure":
+            return self.tangent_pressure
+        if quantity == "volume":
+            return float(self.state.evaluation.volume_gradient @ self.tangent)
+        return float(self.tangent[potential.space.pole])
+
+
+@dataclass(slots=True)
+class Tracer:
+    """Where a trace stands: everything that its next step depends on."""
+
+    path: Path
+    step: float
+    control: StepControl = field(default_factory=StepControl)
+
+
+def first_point(potential: Potential, state: State, direction: int) -> BranchPoint:
+    """The point of a state with its tangent, oriented towards larger volume for direction +1."""
+    border = state.evaluation.volume_gradient
+    tangent, tp = BorderedFactor(state.factor, -border, border, 0.0).solve(np.zeros_like(state.x), 1.0)
+    return _normalised(potential, state, 0.0, direction * tangent, direction * tp)
+
+
+def trace(potential: Potential, point: BranchPoint, tracer: Tracer) -> Iterator[BranchPoint]:
+    """Points of the branch beyond ``point``, one a step, for as long as the caller asks.
+
+    Raises
+    ------
+    SolveError
+        With status STEP_UNDERFLOW when no step of the smallest length converges.
+    """
+    control = tracer.control
+    if not tracer.path.sigma:
+        tracer.path.append(point.sigma, point.state.x, point.state.pressure, point.tangent, point.tangent_pressure)
+    while True:
+        spent = 0
+        while True:
+            new, iterations, quality = _attempt(potential, point, tracer)
+            spent += iterations
+            if new is not None:
+                break
+            tracer.step /= 2
+            if tracer.step < control.smallest:
+                raise SolveError(
+                    f"no step longer than {control.smallest:g} converges from V = {point.state.volume:.9g}, P = {point.state.pressure:.9g}",
+                    status=Status.STEP_UNDERFLOW,
+                )
+        new.state.iterations = spent
+        tracer.path.append(new.sigma, new.state.x, new.state.pressure, new.tangent, new.tangent_pressure)
+        tracer.step = float(np.clip(tracer.step * np.clip(quality, 0.5, 2.0), control.smallest, control.largest))
+        point = new
+        yield new
+
+
+def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[BranchPoint | None, int, float]:
+    """One step of the current length: the new point or None, iterations, and the factor for the next step."""
+    control, step = tracer.control, tracer.step
+    x, p = tracer.path.predict(point.sigma + step)
+    result = correct(potential, ArcLengthControl(point.dual, point.tangent_pressure, x, p), x, p)
+    if result.status is not Status.CONVERGED:
+        return None, result.iterations, 0.5
+    miss = np.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
+    state = State.of(result)
+    new = tangent_at(potential, state, point)
+    cosine = float(point.dual @ new.tangent + point.tangent_pressure * new.tangent_pressure)
+    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    if angle > 2 * control.turn or miss > 50 * control.deviation:
+        return None, result.iterations, 0.5
+    chord = np.sqrt(_square(potential, state.x - point.state.x, state.pressure - point.state.pressure))
+    new.sigma = point.sigma + float(chord / np.sinc(angle / (2 * np.pi)))  # of the circle through both points with these tangents
+    quality = min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))
+    return new, result.iterations, float(quality)
+
+
+def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> BranchPoint:
+    """Unit tangent at a state, oriented like that of a neighbouring point."""
+    bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, neighbour.dual, neighbour.tangent_pressure)
+    tangent, tp = bordered.solve(np.zeros_like(state.x), 1.0)
+    return _normalised(potential, state, neighbour.sigma, tangent, tp)
+
+
+def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
+    size = np.sqrt(inner(potential, tangent, tp, tangent, tp))
+    tangent, tp = tangent / size, tp / size
+    dual = band_product(potential.mass, potential.space.half_bandwidth, tangent) / potential.area
+    return BranchPoint(state, sigma, tangent, float(tp), dual)
+
+
+def _square(potential: Potential, dx: Array, dp: float) -> float:
+    return inner(potential, dx, dp, dx, dp)

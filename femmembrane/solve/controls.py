@@ -1,0 +1,94 @@
+"""What is prescribed while an equilibrium is sought.
+
+An equilibrium of E - P V has the n + 1 unknowns (x, P); the out-of-balance force E' - P V' = 0 gives n equations and a control the last
+one, N(x, P) = 0. Every control is solved by the same bordered Newton corrector.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..discretization.space import Space
+from ..potential import Array, Evaluation
+
+
+class Control(Protocol):
+    """One scalar equation N(x, P) = 0 beside equilibrium."""
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        """N, dN/dx (shape (n_free,)) and dN/dP."""
+
+
+@dataclass(frozen=True)
+class VolumeControl:
+    """V = volume; the pressure is the multiplier."""
+
+    volume: float
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        return evaluation.volume - self.volume, evaluation.volume_gradient, 0.0
+
+
+@dataclass(frozen=True)
+class PressureControl:
+    """P = pressure."""
+
+    pressure: float
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        return pressure - self.pressure, np.zeros_like(x), 1.0
+
+
+@dataclass(frozen=True)
+class CenterHeightControl:
+    """Height of the pole = height; a root of the equations, not a minimiser."""
+
+    height: float
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        row = np.zeros_like(x)
+        row[space.pole] = 1.0
+        return space.center_height(x) - self.height, row, 0.0
+
+
+@dataclass(frozen=True)
+class GasControl:
+    """A fixed amount of ideal gas at constant temperature: P = amount/(V + chamber) - atmosphere.
+
+    Its potential is -amount log((V + chamber)/chamber) + atmosphere V in place of -P V.
+
+    Parameters
+    ----------
+    amount : float
+        (P + atmosphere)(V + chamber), constant, in units of mu T R0^2.
+    chamber : float
+        Volume of the gas behind the flat membrane over R0^3, > 0.
+    atmosphere : float
+        Outside pressure in units of mu T/R0.
+    """
+
+    amount: float
+    chamber: float
+    atmosphere: float = 0.0
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        total = evaluation.volume + self.chamber
+        value = pressure + self.atmosphere - self.amount / total
+        return value, self.amount / total**2 * evaluation.volume_gradient, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class ArcLengthControl:
+    """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0, the inner product already applied to the tangent (its dual)."""
+
+    dual: Array
+    dual_pressure: float
+    prediction: Array
+    predicted_pressure: float
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        value = self.dual @ (x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
+        return float(value), self.dual, self.dual_pressure

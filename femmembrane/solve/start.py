@@ -1,0 +1,114 @@
+"""Cold starts: an equilibrium at a volume without a neighbour to start from.
+
+The order of loading is fixed, so that the answer is one state and not an accident of the optimiser: the membrane is inflated without
+its sources first, then their energy is turned on at constant volume.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..potential import Array, Potential
+from .banded import negative_directions
+from .continuation import BranchPoint, StepControl, Tracer, first_point, trace
+from .controls import PressureControl, VolumeControl
+from .newton import correct
+from .state import Path, State
+from .stepping import march
+
+#: below this volume a membrane with sources is reached from here: turning sources on at the flat state starts from a singular Hessian
+START_VOLUME = 0.5
+#: from this volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
+SAFE_VOLUME = 10.0
+
+
+def spherical_dome(potential: Potential, volume: float) -> Array:
+    """Coefficients of a spherical cap over the rim that encloses a volume, material points at equal angles.
+
+    The height H solves pi H (H^2 + 3)/6 = V: with H = 2 sinh t this is sinh 3t = 3 V/pi, exact down to the smallest volumes.
+    """
+    space = potential.space
+    s = space.interpolation_points()
+    height = 2 * np.sinh(np.arcsinh(3 * volume / np.pi) / 3)
+    if height == 0:
+        return np.zeros(space.n_free)
+    radius = (1 + height**2) / (2 * height)
+    angle = 2 * np.arctan(height)
+    rho = radius * np.sin(angle * s)
+    eta = 2 * radius * np.sin(angle * (1 + s) / 2) * np.sin(angle * (1 - s) / 2)
+    return space.interpolate(rho - s, eta)
+
+
+def start_at_volume(potential: Potential, volume: float) -> State:
+    """The equilibrium at a volume that is reached by inflating first and turning the sources on afterwards.
+
+    Raises
+    ------
+    SolveError
+        When the path ends before the full strength of the sources, or a dome cannot be inflated to the volume.
+    """
+    magnetic = bool(potential.sources)
+    if magnetic and abs(volume) < START_VOLUME:
+        first = start_at_volume(potential, START_VOLUME)
+        return march(potential, first, VolumeControl, START_VOLUME, volume)[-1]
+    state = _inflated(potential, volume)
+    return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1] if magnetic else state
+
+
+def _inflated(potential: Potential, volume: float) -> State:
+    """Equilibrium without sources."""
+    result = correct(potential, VolumeControl(volume), spherical_dome(potential, volume), 0.0, magnetic=0.0, damped=True, max_iterations=40)
+    if result.status is Status.CONVERGED:
+        return State.of(result)
+    if abs(volume) <= SAFE_VOLUME:
+        raise SolveError(f"no dome of volume {volume:.6g} could be inflated; {result.status.advice}", status=result.status)
+    first = np.copysign(SAFE_VOLUME, volume)
+    return march(potential, _inflated(potential, first), VolumeControl, first, volume, magnetic=0.0)[-1]
+
+
+def start_at_pressure(potential: Potential, pressure: float) -> State:
+    """The first stable equilibrium at a pressure on the branch through the moderately inflated membrane.
+
+    The branch is followed by arc length from a small volume in the direction in which the pressure approaches the wanted one, then in
+    the other; the first crossing that is a minimum under pressure control is returned.
+
+    Raises
+    ------
+    SolveError
+        With status NO_EQUILIBRIUM when neither direction crosses the pressure in a minimum.
+    """
+    flat = not potential.sources
+    if pressure == 0 and flat:
+        result = correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0)
+        return State.of(result)
+    # without sources a nearly flat membrane obeys P = 3.34 V^3, and its mirror image carries the opposite pressure
+    volume = float(np.copysign(min(START_VOLUME, (abs(pressure) / 4) ** (1 / 3)), pressure)) if flat else START_VOLUME
+    state = start_at_volume(potential, volume)
+    up = 1 if (state.pressure < pressure) == (first_point(potential, state, 1).rate("pressure", potential) > 0) else -1
+    for direction in (up, -up):
+        found = _first_minimum(potential, first_point(potential, state, direction), pressure)
+        if found is not None:
+            return found
+    raise SolveError(
+        f"no stable equilibrium at P = {pressure:.9g} was met on the branch through V = {volume:.6g}", status=Status.NO_EQUILIBRIUM
+    )
+
+
+def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, steps: int = 300) -> State | None:
+    # long inflated or singular tails carry no further crossing of interest: bounded by the number of steps
+    kd = potential.space.half_bandwidth
+    tracer = Tracer(Path(), StepControl().first * min(1.0, np.sqrt(abs(point.state.volume))))
+    try:
+        for _, new in zip(range(steps), trace(potential, point, tracer), strict=False):
+            low, high = sorted((point.state.pressure, new.state.pressure))
+            if low <= pressure <= high:
+                share = (pressure - point.state.pressure) / (new.state.pressure - point.state.pressure)
+                guess = point.state.x + share * (new.state.x - point.state.x)
+                result = correct(potential, PressureControl(pressure), guess, pressure)
+                if result.status is Status.CONVERGED and negative_directions(result.evaluation.band, kd) == 0:
+                    return State.of(result)
+            point = new
+    except SolveError:
+        return None
+    return None

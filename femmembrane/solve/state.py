@@ -1,0 +1,84 @@
+"""A solved state and the memory of a path that predicts the next one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import Status
+from ..potential import Array, Evaluation, Potential
+from .banded import BandFactor, band_product
+from .newton import NewtonResult
+
+
+@dataclass(slots=True)
+class State:
+    """An equilibrium as the solvers see it: unknowns, the evaluation there, and the factors of K for tangents.
+
+    ``correction`` is the relative size of the last Newton correction, ``gap`` the error of the control equation; both recomputed at x.
+    """
+
+    x: Array
+    pressure: float
+    evaluation: Evaluation
+    factor: BandFactor
+    iterations: int
+    correction: float
+    residual: float
+    gap: float
+    status: Status = Status.CONVERGED
+    seconds: float = 0.0
+
+    @classmethod
+    def of(cls, result: NewtonResult, extra_iterations: int = 0) -> State:
+        """The state of a converged Newton result."""
+        if result.factor is None or result.status is not Status.CONVERGED:
+            raise ValueError("only a converged result is a state")
+        iterations = result.iterations + extra_iterations
+        return cls(result.x, result.pressure, result.evaluation, result.factor, iterations, result.correction, result.residual, result.gap)
+
+    @property
+    def volume(self) -> float:
+        return self.evaluation.volume
+
+
+def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:
+    """Mesh-independent inner product of (x, P) and (y, Q): mean over the reference area of the displacements, plus P Q."""
+    return float(x @ band_product(potential.mass, potential.space.half_bandwidth, y)) / potential.area + p * q
+
+
+def distance(potential: Potential, x: Array, y: Array) -> float:
+    """Root mean square of the difference of two displacements over the reference area."""
+    d = x - y
+    return float(np.sqrt(max(inner(potential, d, 0.0, d, 0.0), 0.0)))
+
+
+@dataclass(slots=True)
+class Path:
+    """The last two points of a path (x, P)(sigma) with their derivatives: predicts by cubic Hermite extrapolation."""
+
+    sigma: list[float] = field(default_factory=list)
+    point: list[Array] = field(default_factory=list)
+    slope: list[Array] = field(default_factory=list)
+
+    def append(self, sigma: float, x: Array, pressure: float, dx: Array, dp: float) -> None:
+        self.sigma.append(sigma)
+        self.point.append(np.append(x, pressure))
+        self.slope.append(np.append(dx, dp))
+        for memory in (self.sigma, self.point, self.slope):
+            del memory[:-2]
+
+    def predict(self, sigma: float) -> tuple[Array, float]:
+        """(x, P) at sigma: a cubic through the last two points, or the tangent at the only one."""
+        if len(self.sigma) == 1:
+            z = self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
+        else:
+            h = self.sigma[1] - self.sigma[0]
+            t = (sigma - self.sigma[1]) / h
+            a = self.point[1] - self.point[0]
+            # Hermite cubic about the newer point
+            second = (2 * self.slope[1] + self.slope[0]) * h - 3 * a
+            third = (self.slope[1] + self.slope[0]) * h - 2 * a
+            z = self.point[1] + t * (h * self.slope[1] + t * (second + t * third))
+        return z[:-1], float(z[-1])

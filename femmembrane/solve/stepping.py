@@ -1,0 +1,108 @@
+"""From one equilibrium to the next under a prescribed load: predictor, corrector, and steps halved until the path is followed.
+
+A converged solve is not yet a step along the branch. A step is accepted only if the corrector moved the prediction by a small part of
+the step itself; otherwise the solver may have jumped, and the step is halved. The answer then does not depend on the mesh or on the
+load steps asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..potential import Array, Potential
+from .banded import BorderedFactor
+from .controls import Control
+from .newton import NewtonResult, correct
+from .state import Path, State, distance
+
+#: largest change that the corrector may make, relative to the step
+MAX_DEVIATION = 0.2
+#: a step this much shorter than the distance to go means that the branch turns or ends
+MIN_STEP = 1e-6
+
+Corrector = Callable[..., NewtonResult]
+
+
+def march(
+    potential: Potential,
+    state: State,
+    control_at: Callable[[float], Control],
+    start: float,
+    stop: float,
+    *,
+    path: Path | None = None,
+    corrector: Corrector = correct,
+    parameter: str = "load",
+    magnetic: float = 1.0,
+) -> list[State]:
+    """Follow a branch from a load to another one.
+
+    Parameters
+    ----------
+    potential, state : Potential, State
+        Where to start.
+    control_at : callable
+        The control at a value of the parameter.
+    start, stop : float
+        Values of the parameter at ``state`` and at the end.
+    path : Path, optional
+        Memory of the steps before, extended in place.
+    corrector : callable
+        :func:`.newton.correct` or a minimiser with its signature.
+    parameter : {"load", "magnetic"}
+        Whether the parameter is the control's own value or the factor on the magnetic energy.
+
+    Returns
+    -------
+    list of State
+        All accepted states in order, the last one at ``stop``.
+
+    Raises
+    ------
+    SolveError
+        With status STEP_UNDERFLOW when steps become tiny; ``result`` holds the states accepted before.
+    """
+    path = Path() if path is None else path
+    factor_of = (lambda value: value) if parameter == "magnetic" else (lambda value: magnetic)
+    if not path.sigma:
+        path.append(start, state.x, state.pressure, *_slope(potential, state, control_at(start), parameter, start))
+    accepted = [state]
+    here, step, shortest = start, stop - start, abs(stop - start) * MIN_STEP
+    spent = 0
+    while here != stop:
+        there = stop if abs(stop - here) <= abs(step) * (1 + 1e-12) else here + step
+        x, pressure = path.predict(there)
+        result = corrector(potential, control_at(there), x, pressure, magnetic=factor_of(there))
+        spent += result.iterations
+        reach = distance(potential, x, accepted[-1].x)
+        if result.status is Status.CONVERGED and distance(potential, result.x, x) <= MAX_DEVIATION * reach + 1e-9 * np.abs(x).max(
+            initial=0.0
+        ):
+            new = State.of(result, spent - result.iterations)
+            path.append(there, new.x, new.pressure, *_slope(potential, new, control_at(there), parameter, there))
+            accepted.append(new)
+            here, spent = there, 0
+            step *= 2
+        else:
+            step = (there - here) / 2
+            if abs(step) < shortest:
+                raise SolveError(
+                    f"the branch could not be followed beyond {here:.9g} on the way to {stop:.9g}",
+                    status=Status.STEP_UNDERFLOW,
+                    result=accepted,
+                )
+    return accepted[1:]
+
+
+def _slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> tuple[Array, float]:
+    """Derivative of (x, P) with respect to the parameter."""
+    space, evaluation = potential.space, state.evaluation
+    _, row, corner = control.equation(space, state.x, state.pressure, evaluation)
+    bordered = BorderedFactor(state.factor, -evaluation.volume_gradient, row, corner)
+    if parameter == "load":
+        return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
+    other = potential.evaluate(state.x, state.pressure, value + 1.0)  # the gradient is linear in the factor: an exact derivative
+    return bordered.solve(evaluation.gradient - other.gradient, 0.0)

@@ -1,0 +1,155 @@
+"""Smallest eigenvalue of the second variation, K phi = lambda M phi, with M the mass of the reference area.
+
+lambda is a squared natural frequency: it converges under refinement, as raw Hessian eigenvalues do not. Under volume control only
+perturbations with V' . phi = 0 compete.
+
+Rayleigh quotient iteration on banded factors, started from a neighbouring state's mode where there is one, costs a few factorisations;
+what it finds is accepted only with a proof by inertia that nothing lies below. Without that proof Lanczos iterations from a certified
+lower bound decide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from ..potential import Array
+from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+
+#: a gap below the eigenvalue found, relative to it, in which inertia must find nothing
+_GAP = 1e-6
+
+
+@dataclass(frozen=True)
+class SmallestEigenvalue:
+    """Smallest eigenvalue with its mode (M-normalised), the number of negative directions, and a bound on the algebraic error."""
+
+    value: float
+    mode: Array
+    negative: int
+    error: float
+
+
+class SpectrumError(ArithmeticError):
+    """No eigenvalue could be proved to be the smallest."""
+
+
+def smallest_eigenvalue(
+    band: Array, mass: Array, half_bandwidth: int, constraint: Array | None = None, guess: Array | None = None
+) -> SmallestEigenvalue:
+    """Smallest lambda of K phi = lambda M phi, with constraint . phi = 0 if given.
+
+    Parameters
+    ----------
+    band, mass : ndarray, shape (3 kd + 1, n)
+        K (symmetric, any inertia) and M (positive definite) in LAPACK general band storage.
+    half_bandwidth : int
+    constraint : ndarray, shape (n,), optional
+    guess : ndarray, shape (n,), optional
+        A mode expected to be near.
+
+    Raises
+    ------
+    SpectrumError
+        When neither method yields an eigenvalue with a proof by inertia.
+    """
+    pencil = _Pencil(band, mass, half_bandwidth, constraint)
+    start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
+    found = pencil.rayleigh(start)
+    if found is None or pencil.below(found[0]) > 0:
+        found = pencil.lanczos()
+        if pencil.below(found[0]) > 0:
+            raise SpectrumError("the eigenvalue found could not be proved to be the smallest")
+    value, mode, error = found
+    # nothing lies below a positive eigenvalue, so there is nothing negative to count
+    negative = 0 if value > error else negative_directions(band, half_bandwidth, constraint)
+    if (negative > 0) != (value < 0) and abs(value) > 10 * error:
+        raise SpectrumError(f"smallest eigenvalue {value:.6g} contradicts {negative} negative directions")
+    return SmallestEigenvalue(value, mode, negative, error)
+
+
+class _Pencil:
+    def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None) -> None:
+        self.band, self.mass, self.kd, self.constraint = band, mass, kd, constraint
+        self.n = band.shape[1]
+        self.scale = float(np.abs(band[2 * kd] / mass[2 * kd]).max())
+
+    def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
+        factor = BandFactor(self.band - shift * self.mass, self.kd)
+        return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, 0.0)
+
+    def solve(self, solver: BandFactor | BorderedFactor, right: Array) -> Array:
+        return solver.solve(right) if isinstance(solver, BandFactor) else solver.solve(right, 0.0)[0]
+
+    def normalised(self, mode: Array) -> tuple[Array, Array]:
+        """Mode and M mode with mode . M mode = 1, the largest entry of the mode positive."""
+        product = band_product(self.mass, self.kd, mode)
+        size = np.sqrt(mode @ product) * np.sign(mode[np.argmax(np.abs(mode))])
+        return mode / size, product / size
+
+    def lower_bound(self) -> float:
+        """A shift below the spectrum: 0 if nothing is negative, else farther and farther down from the scale of ordinary modes."""
+        if negative_directions(self.band, self.kd, self.constraint) == 0:
+            return 0.0
+        shift = -1.0
+        while negative_directions(self.band - shift * self.mass, self.kd, self.constraint) > 0:
+            shift *= 4
+            if shift < -1e3 * self.scale:
+                raise SpectrumError("the second variation has no lower bound within reach")
+        return shift
+
+    def inverse_iterations(self, shift: float, count: int = 4) -> Array:
+        solver = self.shifted_solver(shift)
+        right = np.asarray(np.random.default_rng(0).normal(size=self.n))  # fixed seed: a generic start, the same in every run
+        mode = right
+        for _ in range(count):
+            mode, right = self.normalised(self.solve(solver, right))
+        return mode
+
+    def rayleigh(self, mode: Array, iterations: int = 8) -> tuple[float, Array, float] | None:
+        for _ in range(iterations):
+            mode, right = self.normalised(self.projected(mode))
+            value, error = self.quotient(mode, right)
+            if error <= 1e-10 * abs(value) + 1e-14 * self.scale:
+                return value, mode, error
+            mode = self.solve(self.shifted_solver(value), right)
+            if not np.isfinite(mode).all():
+                return None
+        return None
+
+    def projected(self, mode: Array) -> Array:
+        """Without its component along the constraint."""
+        if self.constraint is None:
+            return mode
+        c = self.constraint
+        return mode - c * ((c @ mode) / (c @ c))
+
+    def quotient(self, mode: Array, right: Array) -> tuple[float, float]:
+        """Rayleigh quotient and the size of the residual in the norm of M with its diagonal as a stand-in for M."""
+        force = band_product(self.band, self.kd, mode)
+        value = float(mode @ force)
+        residual = self.projected(force - value * right)
+        return value, float(np.sqrt(np.sum(residual**2 / self.mass[2 * self.kd])))
+
+    def below(self, value: float) -> int:
+        """Number of eigenvalues clearly below a value, by inertia."""
+        shift = value - max(_GAP * abs(value), 1e-12 * self.scale)
+        return negative_directions(self.band - shift * self.mass, self.kd, self.constraint)
+
+    def lanczos(self) -> tuple[float, Array, float]:
+        shift = self.lower_bound()
+        solver = self.shifted_solver(shift)
+        shape = (self.n, self.n)
+        mass = LinearOperator(shape, matvec=lambda x: band_product(self.mass, self.kd, x.ravel()), dtype=float)
+        inverse = LinearOperator(shape, matvec=lambda x: self.solve(solver, x.ravel()), dtype=float)
+        stiffness = LinearOperator(shape, matvec=lambda x: band_product(self.band, self.kd, x.ravel()), dtype=float)
+        start = self.solve(solver, np.random.default_rng(0).normal(size=self.n))
+        try:
+            _, modes = eigsh(stiffness, k=1, M=mass, sigma=shift, OPinv=inverse, v0=start, tol=1e-12)
+        except (ArpackNoConvergence, ValueError, TypeError) as error:
+            raise SpectrumError(f"Lanczos iterations did not converge: {error}") from error
+        mode, right = self.normalised(modes[:, 0])
+        value, size = self.quotient(mode, right)
+        return value, mode, size

@@ -1,0 +1,120 @@
+"""A verdict on stability that says against what.
+
+"Stable" has a meaning only for a control (what is held while the membrane is perturbed) and a class of perturbations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..discretization.space import Space
+from ..errors import InputError, unknown_name
+from ..potential import Evaluation, Potential
+from .spectrum import SmallestEigenvalue, smallest_eigenvalue
+
+Array = NDArray[np.float64]
+
+CONTROLS = ("pressure", "volume")
+#: compression, relative to the largest stress, from which the Legendre-Hadamard condition counts as failed
+_COMPRESSION = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """Stability of one equilibrium against one class of perturbations.
+
+    Attributes
+    ----------
+    stable : bool or None
+        None when the smallest eigenvalue is zero within its error: a marginal state.
+    smallest_eigenvalue : float
+        lambda of K phi = lambda M phi, a squared natural frequency in units of mu/(rho_m R0^2); NaN where no eigenvalue has a meaning.
+    error : float
+        Bound on the algebraic error of the eigenvalue.
+    control : str or None
+        "pressure" or "volume"; None for azimuthal perturbations, where both agree.
+    azimuthal : int
+        Number of waves around the axis; 0 for axisymmetric perturbations.
+    negative_directions : int or None
+        Number of negative eigenvalues, by inertia.
+    reason : str
+    coefficients : ndarray or None
+        Coefficients of the mode on the free degrees of freedom, normalised in the mass of the reference area.
+    """
+
+    stable: bool | None
+    smallest_eigenvalue: float
+    error: float
+    control: str | None
+    azimuthal: int
+    negative_directions: int | None
+    reason: str
+    coefficients: Array | None = field(default=None, repr=False)
+    _shape: Callable[[Array], Mapping[str, Array]] | None = field(default=None, repr=False)
+
+    @property
+    def mode(self) -> Mapping[str, Array] | None:
+        """The shape of the perturbation at the nodes: r (reference radius), u, w, and c around the axis for azimuthal ones."""
+        return None if self._shape is None or self.coefficients is None else self._shape(self.coefficients)
+
+    @property
+    def word(self) -> str:
+        """stable, unstable or marginal."""
+        return {True: "stable", False: "unstable", None: "marginal"}[self.stable]
+
+
+def axisymmetric_verdict(potential: Potential, evaluation: Evaluation, control: str, guess: Array | None = None) -> Verdict:
+    """Verdict under pressure or volume control against axisymmetric perturbations.
+
+    Raises
+    ------
+    InputError
+        For a control other than "pressure" and "volume".
+    """
+    if control not in CONTROLS:
+        raise (
+            unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
+        )
+    where = _compressed(potential, evaluation)
+    if where is not None:
+        reason = (
+            f"short-wave unstable: the meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}], where the "
+            "Legendre-Hadamard condition fails and the spectrum has no lower bound under refinement"
+        )
+        return Verdict(False, np.nan, np.nan, control, 0, None, reason)
+    constraint = evaluation.volume_gradient if control == "volume" else None
+    found = smallest_eigenvalue(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, guess)
+    return _judge(potential, found, control)
+
+
+def _judge(potential: Potential, found: SmallestEigenvalue, control: str) -> Verdict:
+    stable = None if abs(found.value) <= found.error else found.value > 0
+    among = "axisymmetric perturbations " + ("of constant volume" if control == "volume" else "at constant pressure")
+    reason = {
+        True: f"stable: energy rises under all {among} (smallest eigenvalue {found.value:.6g})",
+        False: f"unstable: energy falls in {found.negative} direction(s) among {among} (smallest eigenvalue {found.value:.6g})",
+        None: f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}",
+    }[stable]
+    return Verdict(stable, found.value, found.error, control, 0, found.negative, reason, found.mode, partial(mode_shape, potential.space))
+
+
+def mode_shape(space: Space, mode: Array) -> dict[str, Array]:
+    """Reference radius and displacements at the nodes from the coefficients of an axisymmetric mode."""
+    s = space.node_parameters()
+    u, _, w, _ = space.evaluate(mode, s)
+    return {"r": space.mesh.position(s)[0], "u": u, "w": w}
+
+
+def _compressed(potential: Potential, evaluation: Evaluation) -> tuple[float, float] | None:
+    """Interval of reference radii with meridional compression."""
+    meridional = evaluation.stress[0]
+    bad = meridional < -_COMPRESSION * np.abs(evaluation.stress).max(initial=0.0)
+    if not bad.any():
+        return None
+    r = potential.space.R.ravel()[bad]
+    return float(r.min()), float(r.max())

@@ -20,16 +20,22 @@ if TYPE_CHECKING:
     from .physics.materials import Ogden as Ogden
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
+    from .results.records import Jump as Jump
     from .results.records import SpecialPoint as SpecialPoint
     from .results.store import load as load
     from .scene import Analysis as Analysis
     from .scene import Run as Run
     from .scene import Scene as Scene
+    from .solve.continuation import StepControl as StepControl
+    from .solve.controls import Gas as Gas
     from .stability.verdict import Verdict as Verdict
+    from .verbs import Equilibria as Equilibria
+    from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
     from .verbs import inflate as inflate
     from .verbs import pressurize as pressurize
     from .verbs import run as run
+    from .verbs import trace as trace
 
 __version__ = "0.1.0"
 
@@ -38,11 +44,13 @@ _ROOMS = {
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.magnetics": ("Dipole",),
     "physics.materials": ("NeoHookean", "Ogden"),
-    "results.records": ("Branch", "Equilibrium", "SpecialPoint"),
+    "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),
+    "solve.continuation": ("StepControl",),
+    "solve.controls": ("Gas",),
     "scene": ("Analysis", "Run", "Scene"),
     "stability.verdict": ("Verdict",),
-    "verbs": ("equilibrium", "inflate", "pressurize", "run"),
+    "verbs": ("Equilibria", "equilibria", "equilibrium", "inflate", "pressurize", "run", "trace"),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -22,6 +22,9 @@ class Status(StrEnum):
     DIPOLE_CONTACT = "dipole contact"
     NOT_A_MINIMUM = "not a minimum"
     LEGENDRE_FAILURE = "Legendre condition fails"
+    STEP_LIMIT = "step limit"
+    UNEXPLAINED_INERTIA = "unexplained change of inertia"
+    INTERRUPTED = "interrupted"
 
     @property
     def advice(self) -> str:
@@ -35,6 +38,9 @@ _ADVICE = {
     Status.NO_EQUILIBRIUM: "no equilibrium was found near this load; the branch turned back before reaching it",
     Status.DIPOLE_CONTACT: "the membrane runs into a source, where the energy has no lower bound; lower the strength or the load",
     Status.NOT_A_MINIMUM: "the state balances forces but is no minimum under this control; a minimiser cannot hold it",
+    Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",
+    Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",
+    Status.INTERRUPTED: "what was computed is kept; continue from there",
     Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh",
 }
 

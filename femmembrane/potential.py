@@ -11,11 +11,11 @@ same for the Newton corrector (NumPy arrays, banded) and for IPOPT (CasADi funct
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -134,12 +134,21 @@ class Potential:
             out[3:11].copy(),
         )
 
-    def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[Array, ...]:
+    def distance_to_sources(self, x: Array) -> float:
+        """Smallest distance between a quadrature point or an element end and a source; infinite without sources."""
+        if not self.sources:
+            return np.inf
+        space = self.space
+        s = np.concatenate([space.s.ravel(), space.mesh.breakpoints()])
+        (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(x, s)
+        return float(min(np.sqrt(source.distance_squared(R + u, Z + w).min()) for source in self.sources))
+
+    def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
         space = self.space
         elastic, volume = (np.abs(d).reshape(-1, space.n_elements) for d in (evaluation.force_density[:4], evaluation.force_density[4:]))
         total = space.assemble_magnitude(elastic) + abs(pressure) * space.assemble_magnitude(volume)
-        return tuple(total[index].max(initial=0.0) for index in space.fields)
+        return tuple(float(total[index].max(initial=0.0)) for index in space.fields)
 
     def _undefined(self) -> Evaluation:
         """Outside the domain of the energy: a fold of the meridian onto itself, a radius past the axis, a source."""
@@ -184,6 +193,62 @@ class Potential:
         return _nlp_functions(self)
 
 
+@dataclass(slots=True)
+class FoldDerivatives:
+    """Derivatives that a fold followed in a number of the scene needs, for a mode (v, q) of displacement and pressure.
+
+    ``cubic``, ``cubic_pressure`` and ``cubic_number`` are those of the quadratic form v.(E'' - P V'') v - 2 q V'.v with respect to x (shape
+    (n_free,)), P and the number; ``force_number`` is that of E' - P V' with respect to the number, shape (n_free,).
+    """
+
+    cubic: Array
+    cubic_pressure: float
+    cubic_number: float
+    force_number: Array
+
+
+class Family(Potential):
+    """The potential of scenes that differ in one number, built once for all its values.
+
+    It is a :class:`Potential` whose factor, third argument of :meth:`evaluate`, is the number.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any member of the family.
+    vary : callable
+        The parts of the member at a value of the number, a CasADi symbol here: an object with the attributes of a scene.
+    """
+
+    def __init__(self, scene: Scene, vary: Callable[[Any], Any], quadrature: int | None = None) -> None:
+        number = ca.SX.sym("number")
+        with _casadi_answers_numpy():
+            super().__init__(vary(number), quadrature)
+        self.scene, self.sources = scene, scene.sources
+        slot = self._symbols[2][1]
+        names = list(self._terms)
+        old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
+        self._terms = {name: ca.substitute(self._terms[name], old, new) for name in names}
+
+    @cached_property
+    def _fold_kernel(self) -> _Kernel:
+        t, (data, local, parameters) = self._terms, self._symbols
+        mode, q = ca.SX.sym("mode", 4), ca.SX.sym("q")
+        force = t["gradient"] - parameters[0] * t["volume_gradient"]
+        form = ca.dot(mode, ca.jtimes(force, local, mode)) - 2 * q * ca.dot(t["volume_gradient"], mode)
+        rows = [ca.gradient(form, local), ca.gradient(form, parameters), ca.jacobian(force, parameters[1])]
+        symbols = [data, ca.vertcat(local, mode), ca.vertcat(parameters, q)]
+        return _Kernel(ca.Function("fold", symbols, [ca.densify(ca.vertcat(*rows))], {"cse": True}), self.point_data)
+
+    def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
+        """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
+        space, ne = self.space, self.space.n_elements
+        local = np.concatenate([space.at_quadrature(x), space.at_quadrature(mode)])
+        out = self._fold_kernel(local, np.array([pressure, number, q]))
+        cubic, force = (space.assemble_vector(rows.reshape(-1, ne)) for rows in (out[:4], out[6:]))
+        return FoldDerivatives(cubic, float(out[4].sum()), float(out[5].sum()), force)
+
+
 @dataclass(frozen=True)
 class NlpFunctions:
     """E - P V under a scaling of the unknowns, x = scale_u y_u and x = scale_w y_w, as CasADi functions for ``nlpsol``.
@@ -216,8 +281,8 @@ class _Kernel:
         self._out = np.zeros((self.n_blocks, self.rows, self.block))
         self._buffer, self._call = vector.buffer()
         for k, array in enumerate((self._data, self._local, self._parameters)):
-            self._buffer.set_arg(k, memoryview(array))
-        self._buffer.set_res(0, memoryview(self._out))
+            self._buffer.set_arg(k, memoryview(array))  # type: ignore[arg-type, call-arg]
+        self._buffer.set_res(0, memoryview(self._out))  # type: ignore[arg-type, call-arg]
 
     def _split(self, rows: Array) -> Array:
         """(rows, n) -> (n_blocks, rows, block), the last block filled up with its own last point."""

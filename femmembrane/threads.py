@@ -1,9 +1,8 @@
 """One thread for linear algebra on one meridian.
 
-Its matrices are narrow bands and batches of tiny products: handing them to several BLAS threads costs more than the work itself (the run
-of the README was twice as slow with two threads), and the order of summation would depend on their number. Every public computation runs
-under :func:`one_thread`, so that results are the same to the last bit however many threads a machine has. Parallelism belongs a level higher, to
-whole scenes.
+Its matrices are narrow bands and batches of tiny products: handing them to several BLAS threads costs more than the work itself,
+and the order of summation would depend on their number. Every public computation runs under :func:`one_thread`, so that results are the
+same to the last bit however many threads a machine has. Parallelism belongs a level higher, to whole scenes.
 """
 
 from __future__ import annotations

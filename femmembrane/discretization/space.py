@@ -81,9 +81,9 @@ class Space:
         self._hessian_table = np.ascontiguousarray(np.stack(outer, axis=2).reshape(n_local**2, -1))
         # position of each local entry in LAPACK band storage, column by column: A[i, j] at [2 kd + i - j, j]
         kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
-        i, j = np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :])
+        row, column = np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :])
         spare = self.n_free * depth
-        flat = np.where((i < self.n_free) & (j < self.n_free), j * depth + 2 * kd + i - j, spare)
+        flat = np.where((row < self.n_free) & (column < self.n_free), column * depth + 2 * kd + row - column, spare)
         self._band_index = flat.reshape(n_local**2, -1).ravel()
         self._gather_flat = self.gather.ravel()
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Protocol
 
 from ..errors import InputError
@@ -21,6 +22,9 @@ class Source(Protocol):
 
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any]:
         """Magnetic field (h_rho, h_z) at the deformed point (rho, eta), in units of sqrt(mu/mu0)."""
+
+    def distance_squared(self, rho: Any, eta: Any) -> Any:
+        """Squared distance from the source, where the field is singular."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +51,9 @@ class Dipole:
     orientation: int = 1
 
     def __post_init__(self) -> None:
-        if not (_is_number(self.strength) and 0 <= self.strength < math.inf):
+        if not (_is_number(self.strength) and self.strength >= 0):
             raise InputError("source.strength", self.strength, "a finite number >= 0 is allowed")
-        if not (_is_number(self.height) and math.isfinite(self.height)):
+        if not _is_number(self.height):
             raise InputError("source.height", self.height, "a finite number is allowed (in units of R0; negative is below)")
         if isinstance(self.orientation, bool) or self.orientation not in (1, -1):
             raise InputError("source.orientation", self.orientation, "1 or -1 is allowed")
@@ -78,4 +82,8 @@ def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rh
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    """Whether a value is a finite number, NumPy's included; truth values are none."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(float(value))
+    except OverflowError:  # a whole number that no float can hold
+        return False

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
@@ -102,9 +103,11 @@ def _powers(alpha: float, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
 
 def _numbers(key: str, values: Any) -> tuple[float, ...]:
     try:
-        result = tuple(float(v) for v in values)
-    except (TypeError, ValueError):
-        raise InputError(key, values, "a list of numbers is allowed") from None
-    if not result or not all(math.isfinite(v) for v in result):
-        raise InputError(key, values, "one or more finite numbers are allowed")
+        # a text is a sequence, and a truth value a number, to float() alone
+        given = () if isinstance(values, (str, bytes)) else tuple(values)
+        result = tuple(float(v) for v in given if isinstance(v, Real) and not isinstance(v, bool))
+    except (TypeError, OverflowError):
+        raise InputError(key, values, "a list of finite numbers is allowed") from None
+    if not result or len(result) < len(given) or not all(math.isfinite(v) for v in result):
+        raise InputError(key, values, "a list of one or more finite numbers is allowed")
     return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -19,6 +20,7 @@ from ..threads import one_thread
 if TYPE_CHECKING:
     from ..potential import Potential
     from ..scene import Scene
+    from ..solve.controls import Gas
     from ..stability.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -51,6 +53,8 @@ class Equilibrium:
         Displacement coefficients of the free degrees of freedom (read-only).
     seconds : float
         Wall time spent on this equilibrium and its verdicts.
+    gas : Gas or None
+        The enclosed gas that holds it, when found under gas control.
     """
 
     pressure: float
@@ -64,6 +68,7 @@ class Equilibrium:
     scene: Scene = field(repr=False)
     state: Array = field(repr=False)
     seconds: float = field(default=0.0, repr=False)
+    gas: Gas | None = field(default=None, repr=False)
     _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
 
     @property
@@ -102,22 +107,31 @@ class Equilibrium:
         return _profile(self, s)
 
     @one_thread
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0) -> Verdict:
-        """Stability under a control ("pressure" or "volume") against axisymmetric perturbations; computed once and remembered.
+    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
+        """Stability against one class of perturbations; computed once and remembered.
+
+        Parameters
+        ----------
+        control : {"pressure", "volume", "gas"}
+            What is held against axisymmetric perturbations; left out for azimuthal ones, which do not change the volume.
+        azimuthal : int
+            Number of waves around the axis; 0 for axisymmetric perturbations.
+        gas : Gas, optional
+            For control "gas": the enclosed gas; default the one under which this equilibrium was found.
 
         Raises
         ------
         InputError
-            For an unknown control.
+            For an unknown control, or one that does not go with the rest.
         """
         key = (control, azimuthal)
-        if key not in self._verdicts:
-            from ..stability.verdict import axisymmetric_verdict
+        gas = gas or self.gas
+        if key not in self._verdicts or control == "gas":
+            from ..stability.judge import judge
 
-            if control is None:
-                raise InputError("control", control, '"pressure" or "volume" is allowed')
             evaluation = self.potential.evaluate(self.state, self.pressure)
-            self._verdicts[key] = axisymmetric_verdict(self.potential, evaluation, control)
+            soft = gas.compliance(self.volume) if gas else None
+            self._verdicts[key] = judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=soft)
         return self._verdicts[key]
 
 
@@ -144,6 +158,47 @@ class SpecialPoint:
 
 
 @dataclass(frozen=True, eq=False)
+class TraceMemory:
+    """What the next step of a trace depends on, so that an interrupted one goes on as if it had not been.
+
+    Attributes
+    ----------
+    sigma : tuple of float
+        Arc length at the last two points (one at the very start).
+    points, slopes : ndarray, shape (len(sigma), n_free + 1)
+        (x, P) and its unit tangent there.
+    step : float
+        Length of the next step.
+    regular : int
+        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
+    """
+
+    sigma: tuple[float, ...]
+    points: Array
+    slopes: Array
+    step: float
+    regular: int
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """A snap of a run from one part of the branch to another.
+
+    Attributes
+    ----------
+    index : int
+        Position in the branch of the equilibrium landed on.
+    limit : SpecialPoint or None
+        The fold at which the branch turned back before the load.
+    landing : Equilibrium
+    """
+
+    index: int
+    limit: SpecialPoint | None
+    landing: Equilibrium
+
+
+@dataclass(frozen=True, eq=False)
 class Branch(Sequence[Equilibrium]):
     """Equilibria in the order in which they were found.
 
@@ -156,6 +211,9 @@ class Branch(Sequence[Equilibrium]):
     timings : mapping of str to float
         Seconds by stage.
     special_points : tuple of SpecialPoint, or None when none were looked for
+    memory : TraceMemory, or None for a branch that was not traced by arc length
+    jumps : tuple of Jump
+        Where a run snapped because the branch turned back before a load.
     """
 
     scene: Scene
@@ -164,6 +222,8 @@ class Branch(Sequence[Equilibrium]):
     message: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
     special_points: tuple[SpecialPoint, ...] | None = None
+    memory: TraceMemory | None = field(default=None, repr=False)
+    jumps: tuple[Jump, ...] = ()
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -176,21 +236,20 @@ class Branch(Sequence[Equilibrium]):
 
     def __getitem__(self, index: int | slice) -> Equilibrium | Branch:
         if isinstance(index, slice):
-            return replace(self, equilibria=self.equilibria[index])
+            return replace(self, equilibria=self.equilibria[index], memory=None)
         return self.equilibria[index]
 
     def __iter__(self) -> Iterator[Equilibrium]:
         return iter(self.equilibria)
 
     def column(self, name: str) -> NDArray[Any]:
-        """One column of the table as an array: step, an attribute of :class:`Equilibrium`, or lambda_/verdict_ with pressure, volume."""
+        """One column of the table: step, an attribute of :class:`Equilibrium`, or lambda_/verdict_ with pressure, volume, n1, n2, ..."""
         if name == "step":
             return np.arange(len(self))
-        kind, _, control = name.partition("_")
-        if kind == "lambda" and control in _SHOWN:
-            return np.array([eq.verdict(control).smallest_eigenvalue for eq in self])
-        if kind == "verdict" and control in _SHOWN:
-            return np.array([eq.verdict(control).word for eq in self])
+        kind, _, what = name.partition("_")
+        if kind in ("lambda", "verdict") and (what in _SHOWN or re.fullmatch(r"n[1-9]\d*", what)):
+            verdicts = [eq.verdict(what) if what in _SHOWN else eq.verdict(azimuthal=int(what[1:])) for eq in self]
+            return np.array([v.smallest_eigenvalue if kind == "lambda" else v.word for v in verdicts])
         known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
         if name not in known:
             raise unknown_name("column", name, ("step", *known, *(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN)))

@@ -25,6 +25,12 @@ class BandFactor:
         solution, _ = lapack.dgbtrs(self._lu, self.kd, self.kd, right, self._pivots)
         return solution
 
+    def determinant_sign(self) -> int:
+        """Sign of the determinant."""
+        swaps = int((self._pivots != np.arange(len(self._pivots))).sum())
+        negative = int((self._lu[2 * self.kd] < 0).sum())
+        return 1 if (swaps + negative) % 2 == 0 else -1
+
 
 class BorderedFactor:
     """Solver for a symmetric band matrix K with one border::
@@ -61,12 +67,12 @@ def cholesky_exists(band: Array, half_bandwidth: int) -> bool:
     return bool(info == 0)
 
 
-def negative_directions(band: Array, half_bandwidth: int, constraint: Array | None = None) -> int:
-    """Number of negative eigenvalues of a symmetric band matrix, or of its restriction to ``constraint . x = 0``.
+def negative_directions(band: Array, half_bandwidth: int, constraint: Array | None = None, compliance: float = 0.0) -> int:
+    """Number of negative eigenvalues of K, of K restricted to ``constraint . x = 0``, or of K + constraint constraint^T/compliance.
 
     An exact count, not a partial spectrum: a few unknowns are pinned until the rest is positive definite (Cholesky), and the count is
     that of the Schur complement on the pinned ones (Haynsworth's inertia additivity, a block L D L^T). A constraint is one more border
-    with a zero corner; it carries one negative direction of its own.
+    with corner -compliance <= 0; it carries one negative direction of its own.
 
     Parameters
     ----------
@@ -74,6 +80,8 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
         LAPACK general band storage.
     half_bandwidth : int
     constraint : ndarray, shape (n,), optional
+    compliance : float
+        0 for a rigid constraint; a soft one, such as an enclosed gas, is a spring.
     """
     n, kd = band.shape[1], half_bandwidth
     upper = band[kd : 2 * kd + 1]
@@ -96,10 +104,11 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
             schur[:k, :k] += corner
             schur[:k, k:] += borders[pins]
             schur[k:, :k] += borders[pins].T
+            schur[k:, k:] -= compliance
             return int((np.linalg.eigvalsh(schur) < 0).sum()) - borders.shape[1]
         if count >= n:
             break
-    return _sparse_count(band, kd, constraint)
+    return _sparse_count(band, kd, constraint, compliance)
 
 
 def _spread(n: int, count: int) -> np.ndarray:
@@ -130,7 +139,7 @@ def _columns(band: Array, kd: int, pins: np.ndarray) -> Array:
     return dense
 
 
-def _sparse_count(band: Array, kd: int, constraint: Array | None) -> int:
+def _sparse_count(band: Array, kd: int, constraint: Array | None, compliance: float) -> int:
     """Count by sparse L D L^T without pivoting, for matrices with very many negative directions."""
     n = band.shape[1]
     matrix = sparse.dia_array((band[kd:], np.arange(kd, -kd - 1, -1)), shape=(n, n)).tocsc()
@@ -138,4 +147,4 @@ def _sparse_count(band: Array, kd: int, constraint: Array | None) -> int:
     count = int((lu.U.diagonal() < 0).sum())
     if constraint is None:
         return count
-    return count + int(-constraint @ lu.solve(constraint) < 0) - 1
+    return count + int(-compliance - constraint @ lu.solve(constraint) < 0) - 1

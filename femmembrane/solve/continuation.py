@@ -75,7 +75,7 @@ def first_point(potential: Potential, state: State, direction: int) -> BranchPoi
     return _normalised(potential, state, 0.0, direction * tangent, direction * tp)
 
 
-def trace(potential: Potential, point: BranchPoint, tracer: Tracer) -> Iterator[BranchPoint]:
+def trace_points(potential: Potential, point: BranchPoint, tracer: Tracer) -> Iterator[BranchPoint]:
     """Points of the branch beyond ``point``, one a step, for as long as the caller asks.
 
     Raises
@@ -126,6 +126,12 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     return new, result.iterations, float(quality)
 
 
+def oriented_point(potential: Potential, state: State, sigma: float, tangent: Array, tangent_pressure: float) -> BranchPoint:
+    """The point of a state whose unit tangent is known."""
+    dual = band_product(potential.mass, potential.space.half_bandwidth, tangent) / potential.area
+    return BranchPoint(state, sigma, tangent, tangent_pressure, dual)
+
+
 def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> BranchPoint:
     """Unit tangent at a state, oriented like that of a neighbouring point."""
     bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, neighbour.dual, neighbour.tangent_pressure)
@@ -135,9 +141,7 @@ def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> Br
 
 def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
     size = np.sqrt(inner(potential, tangent, tp, tangent, tp))
-    tangent, tp = tangent / size, tp / size
-    dual = band_product(potential.mass, potential.space.half_bandwidth, tangent) / potential.area
-    return BranchPoint(state, sigma, tangent, float(tp), dual)
+    return oriented_point(potential, state, sigma, tangent / size, float(tp / size))
 
 
 def _square(potential: Potential, dx: Array, dp: float) -> float:

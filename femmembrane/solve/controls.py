@@ -6,17 +6,20 @@ one, N(x, P) = 0. Every control is solved by the same bordered Newton corrector.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
 
 from ..discretization.space import Space
+from ..errors import InputError
 from ..potential import Array, Evaluation
 
 
 class Control(Protocol):
-    """One scalar equation N(x, P) = 0 beside equilibrium."""
+    """One scalar equation N(x, P) = 0 beside equilibrium, written as (what is held) - (its value)."""
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         """N, dN/dx (shape (n_free,)) and dN/dP."""
@@ -55,7 +58,7 @@ class CenterHeightControl:
 
 
 @dataclass(frozen=True)
-class GasControl:
+class Gas:
     """A fixed amount of ideal gas at constant temperature: P = amount/(V + chamber) - atmosphere.
 
     Its potential is -amount log((V + chamber)/chamber) + atmosphere V in place of -P V.
@@ -63,21 +66,45 @@ class GasControl:
     Parameters
     ----------
     amount : float
-        (P + atmosphere)(V + chamber), constant, in units of mu T R0^2.
+        (P + atmosphere)(V + chamber) > 0, constant, in units of mu T R0^2.
     chamber : float
         Volume of the gas behind the flat membrane over R0^3, > 0.
     atmosphere : float
-        Outside pressure in units of mu T/R0.
+        Outside pressure >= 0 in units of mu T/R0.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
     """
 
     amount: float
     chamber: float
     atmosphere: float = 0.0
 
+    def __post_init__(self) -> None:
+        for key in ("amount", "chamber", "atmosphere"):
+            value = getattr(self, key)
+            if (
+                isinstance(value, bool)
+                or not isinstance(value, Real)
+                or not math.isfinite(value)
+                or value < 0
+                or (value == 0 and key != "atmosphere")
+            ):
+                raise InputError(f"gas.{key}", value, f"a finite number {'>=' if key == 'atmosphere' else '>'} 0 is allowed")
+
+    def pressure(self, volume: float) -> float:
+        """Pressure over the atmosphere at a volume of the membrane."""
+        return self.amount / (volume + self.chamber) - self.atmosphere
+
+    def compliance(self, volume: float) -> float:
+        """-dV/dP at constant amount."""
+        return (volume + self.chamber) ** 2 / self.amount
+
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
-        total = evaluation.volume + self.chamber
-        value = pressure + self.atmosphere - self.amount / total
-        return value, self.amount / total**2 * evaluation.volume_gradient, 1.0
+        absolute, total = pressure + self.atmosphere, evaluation.volume + self.chamber
+        return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
 
 
 @dataclass(frozen=True, eq=False)

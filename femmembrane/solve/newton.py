@@ -62,7 +62,7 @@ def correct(
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration = np.inf, 0
     while True:
-        equations = _Equations(potential, control, x, pressure, evaluation)
+        equations = Equations(potential, control, x, pressure, evaluation)
         if not equations.finite:
             return NewtonResult(x, pressure, evaluation, None, iteration, np.inf, np.inf, equations.gap, Status.NOT_CONVERGED)
         dx, dp = equations.newton_step()
@@ -79,7 +79,7 @@ def correct(
         previous, iteration = size, iteration + 1
 
 
-class _Equations:
+class Equations:
     """Residuals and bordered factors at one state."""
 
     def __init__(self, potential: Potential, control: Control, x: Array, pressure: float, evaluation: Evaluation) -> None:
@@ -99,7 +99,7 @@ class _Equations:
         return self._bordered.solve(-force, -gap)[0]
 
 
-def _damping(equations: _Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
+def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
     """Largest step length 1, 1/2, 1/4, ... after which the simplified correction has shrunk."""
     potential, length = equations.potential, 1.0
     while length > 1e-4:

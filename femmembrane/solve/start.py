@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from .banded import negative_directions
-from .continuation import BranchPoint, StepControl, Tracer, first_point, trace
-from .controls import PressureControl, VolumeControl
+from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
+from .controls import CenterHeightControl, PressureControl, VolumeControl
 from .newton import correct
 from .state import Path, State
 from .stepping import march
@@ -53,7 +53,14 @@ def start_at_volume(potential: Potential, volume: float) -> State:
         first = start_at_volume(potential, START_VOLUME)
         return march(potential, first, VolumeControl, START_VOLUME, volume)[-1]
     state = _inflated(potential, volume)
-    return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1] if magnetic else state
+    if not magnetic:
+        return state
+    try:
+        return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1]
+    except SolveError as error:
+        raise SolveError(
+            f"the sources could not be turned on to their full strength at V = {volume:.6g}: {error}", status=Status.NO_EQUILIBRIUM
+        ) from error
 
 
 def _inflated(potential: Potential, volume: float) -> State:
@@ -95,12 +102,19 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
     )
 
 
+def start_at_height(potential: Potential, height: float) -> State:
+    """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
+    state = start_at_volume(potential, float(np.copysign(START_VOLUME, height)))
+    here = potential.space.center_height(state.x)
+    return march(potential, state, CenterHeightControl, here, height)[-1] if height != here else state
+
+
 def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, steps: int = 300) -> State | None:
     # long inflated or singular tails carry no further crossing of interest: bounded by the number of steps
     kd = potential.space.half_bandwidth
     tracer = Tracer(Path(), StepControl().first * min(1.0, np.sqrt(abs(point.state.volume))))
     try:
-        for _, new in zip(range(steps), trace(potential, point, tracer), strict=False):
+        for _, new in zip(range(steps), trace_points(potential, point, tracer), strict=False):
             low, high = sorted((point.state.pressure, new.state.pressure))
             if low <= pressure <= high:
                 share = (pressure - point.state.pressure) / (new.state.pressure - point.state.pressure)

@@ -75,10 +75,11 @@ class Path:
             z = self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
         else:
             h = self.sigma[1] - self.sigma[0]
-            t = (sigma - self.sigma[1]) / h
-            a = self.point[1] - self.point[0]
-            # Hermite cubic about the newer point
-            second = (2 * self.slope[1] + self.slope[0]) * h - 3 * a
-            third = (self.slope[1] + self.slope[0]) * h - 2 * a
-            z = self.point[1] + t * (h * self.slope[1] + t * (second + t * third))
+            z = hermite(self.point[0], h * self.slope[0], self.point[1], h * self.slope[1], (sigma - self.sigma[0]) / h)
         return z[:-1], float(z[-1])
+
+
+def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float) -> Array:
+    """Cubic with values and slopes at t = 0 and t = 1; extrapolates beyond. Written about b, the newer point."""
+    rise, back = b - a, t - 1
+    return b + back * (slope_b + back * ((2 * slope_b + slope_a - 3 * rise) + back * (slope_b + slope_a - 2 * rise)))

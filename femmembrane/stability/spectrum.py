@@ -37,9 +37,14 @@ class SpectrumError(ArithmeticError):
 
 
 def smallest_eigenvalue(
-    band: Array, mass: Array, half_bandwidth: int, constraint: Array | None = None, guess: Array | None = None
+    band: Array,
+    mass: Array,
+    half_bandwidth: int,
+    constraint: Array | None = None,
+    guess: Array | None = None,
+    compliance: float = 0.0,
 ) -> SmallestEigenvalue:
-    """Smallest lambda of K phi = lambda M phi, with constraint . phi = 0 if given.
+    """Smallest lambda of K phi = lambda M phi, with constraint . phi = 0 or with the spring of a soft constraint.
 
     Parameters
     ----------
@@ -49,13 +54,15 @@ def smallest_eigenvalue(
     constraint : ndarray, shape (n,), optional
     guess : ndarray, shape (n,), optional
         A mode expected to be near.
+    compliance : float
+        Of the constraint: 0 for a rigid one, else K is stiffened by constraint constraint^T/compliance.
 
     Raises
     ------
     SpectrumError
         When neither method yields an eigenvalue with a proof by inertia.
     """
-    pencil = _Pencil(band, mass, half_bandwidth, constraint)
+    pencil = _Pencil(band, mass, half_bandwidth, constraint, compliance)
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.rayleigh(start)
     if found is None or pencil.below(found[0]) > 0:
@@ -64,21 +71,21 @@ def smallest_eigenvalue(
             raise SpectrumError("the eigenvalue found could not be proved to be the smallest")
     value, mode, error = found
     # nothing lies below a positive eigenvalue, so there is nothing negative to count
-    negative = 0 if value > error else negative_directions(band, half_bandwidth, constraint)
+    negative = 0 if value > error else pencil.count(0.0)
     if (negative > 0) != (value < 0) and abs(value) > 10 * error:
         raise SpectrumError(f"smallest eigenvalue {value:.6g} contradicts {negative} negative directions")
     return SmallestEigenvalue(value, mode, negative, error)
 
 
 class _Pencil:
-    def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None) -> None:
-        self.band, self.mass, self.kd, self.constraint = band, mass, kd, constraint
-        self.n = band.shape[1]
+    def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float) -> None:
+        self.band, self.mass, self.kd, self.constraint, self.compliance = band, mass, kd, constraint, compliance
+        self.n = int(band.shape[1])
         self.scale = float(np.abs(band[2 * kd] / mass[2 * kd]).max())
 
     def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
         factor = BandFactor(self.band - shift * self.mass, self.kd)
-        return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, 0.0)
+        return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, -self.compliance)
 
     def solve(self, solver: BandFactor | BorderedFactor, right: Array) -> Array:
         return solver.solve(right) if isinstance(solver, BandFactor) else solver.solve(right, 0.0)[0]
@@ -91,10 +98,10 @@ class _Pencil:
 
     def lower_bound(self) -> float:
         """A shift below the spectrum: 0 if nothing is negative, else farther and farther down from the scale of ordinary modes."""
-        if negative_directions(self.band, self.kd, self.constraint) == 0:
+        if self.count(0.0) == 0:
             return 0.0
         shift = -1.0
-        while negative_directions(self.band - shift * self.mass, self.kd, self.constraint) > 0:
+        while self.count(shift) > 0:
             shift *= 4
             if shift < -1e3 * self.scale:
                 raise SpectrumError("the second variation has no lower bound within reach")
@@ -102,7 +109,7 @@ class _Pencil:
 
     def inverse_iterations(self, shift: float, count: int = 4) -> Array:
         solver = self.shifted_solver(shift)
-        right = np.asarray(np.random.default_rng(0).normal(size=self.n))  # fixed seed: a generic start, the same in every run
+        right = np.random.default_rng(0).standard_normal(self.n)  # fixed seed: a generic start, the same in every run
         mode = right
         for _ in range(count):
             mode, right = self.normalised(self.solve(solver, right))
@@ -120,15 +127,21 @@ class _Pencil:
         return None
 
     def projected(self, mode: Array) -> Array:
-        """Without its component along the constraint."""
-        if self.constraint is None:
+        """Without its component along a rigid constraint."""
+        if self.constraint is None or self.compliance > 0:
             return mode
         c = self.constraint
         return mode - c * ((c @ mode) / (c @ c))
 
+    def stiffness(self, mode: Array) -> Array:
+        force = band_product(self.band, self.kd, mode)
+        if self.constraint is not None and self.compliance > 0:
+            force = force + self.constraint * ((self.constraint @ mode) / self.compliance)
+        return force
+
     def quotient(self, mode: Array, right: Array) -> tuple[float, float]:
         """Rayleigh quotient and the size of the residual in the norm of M with its diagonal as a stand-in for M."""
-        force = band_product(self.band, self.kd, mode)
+        force = self.stiffness(mode)
         value = float(mode @ force)
         residual = self.projected(force - value * right)
         return value, float(np.sqrt(np.sum(residual**2 / self.mass[2 * self.kd])))
@@ -136,7 +149,12 @@ class _Pencil:
     def below(self, value: float) -> int:
         """Number of eigenvalues clearly below a value, by inertia."""
         shift = value - max(_GAP * abs(value), 1e-12 * self.scale)
-        return negative_directions(self.band - shift * self.mass, self.kd, self.constraint)
+        return self.count(shift)
+
+    def count(self, shift: float) -> int:
+        """Number of eigenvalues below a shift, by inertia."""
+        band = self.band - shift * self.mass if shift else self.band
+        return negative_directions(band, self.kd, self.constraint, self.compliance)
 
     def lanczos(self) -> tuple[float, Array, float]:
         shift = self.lower_bound()
@@ -144,8 +162,8 @@ class _Pencil:
         shape = (self.n, self.n)
         mass = LinearOperator(shape, matvec=lambda x: band_product(self.mass, self.kd, x.ravel()), dtype=float)
         inverse = LinearOperator(shape, matvec=lambda x: self.solve(solver, x.ravel()), dtype=float)
-        stiffness = LinearOperator(shape, matvec=lambda x: band_product(self.band, self.kd, x.ravel()), dtype=float)
-        start = self.solve(solver, np.random.default_rng(0).normal(size=self.n))
+        stiffness = LinearOperator(shape, matvec=lambda x: self.stiffness(x.ravel()), dtype=float)
+        start = self.solve(solver, np.random.default_rng(0).standard_normal(self.n))
         try:
             _, modes = eigsh(stiffness, k=1, M=mass, sigma=shift, OPinv=inverse, v0=start, tol=1e-12)
         except (ArpackNoConvergence, ValueError, TypeError) as error:

@@ -19,7 +19,7 @@ from .spectrum import SmallestEigenvalue, smallest_eigenvalue
 
 Array = NDArray[np.float64]
 
-CONTROLS = ("pressure", "volume")
+CONTROLS = ("pressure", "volume", "gas")
 #: compression, relative to the largest stress, from which the Legendre-Hadamard condition counts as failed
 _COMPRESSION = 1e-8
 
@@ -37,7 +37,7 @@ class Verdict:
     error : float
         Bound on the algebraic error of the eigenvalue.
     control : str or None
-        "pressure" or "volume"; None for azimuthal perturbations, where both agree.
+        "pressure", "volume" or "gas"; None for azimuthal perturbations, where both agree.
     azimuthal : int
         Number of waves around the axis; 0 for axisymmetric perturbations.
     negative_directions : int or None
@@ -68,33 +68,45 @@ class Verdict:
         return {True: "stable", False: "unstable", None: "marginal"}[self.stable]
 
 
-def axisymmetric_verdict(potential: Potential, evaluation: Evaluation, control: str, guess: Array | None = None) -> Verdict:
-    """Verdict under pressure or volume control against axisymmetric perturbations.
+def axisymmetric_verdict(
+    potential: Potential, evaluation: Evaluation, control: str, guess: Array | None = None, compliance: float | None = None
+) -> Verdict:
+    """Verdict against axisymmetric perturbations under pressure, volume or gas control.
+
+    Parameters
+    ----------
+    compliance : float, optional
+        Of an enclosed gas, -dV/dP at constant amount: required for "gas". Its pressure falls as the volume grows, which stiffens the
+        second variation by V' V'^T/compliance: between pressure control (infinitely compliant) and volume control (rigid).
 
     Raises
     ------
     InputError
-        For a control other than "pressure" and "volume".
+        For an unknown control, or "gas" without the gas.
     """
     if control not in CONTROLS:
         raise (
             unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
         )
-    where = _compressed(potential, evaluation)
+    where = compressed(potential, evaluation)
     if where is not None:
         reason = (
             f"short-wave unstable: the meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}], where the "
             "Legendre-Hadamard condition fails and the spectrum has no lower bound under refinement"
         )
         return Verdict(False, np.nan, np.nan, control, 0, None, reason)
-    constraint = evaluation.volume_gradient if control == "volume" else None
-    found = smallest_eigenvalue(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, guess)
+    if control == "gas" and compliance is None:
+        raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
+    constraint = None if control == "pressure" else evaluation.volume_gradient
+    soft = compliance or 0.0 if control == "gas" else 0.0
+    found = smallest_eigenvalue(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, guess, soft)
     return _judge(potential, found, control)
 
 
 def _judge(potential: Potential, found: SmallestEigenvalue, control: str) -> Verdict:
     stable = None if abs(found.value) <= found.error else found.value > 0
-    among = "axisymmetric perturbations " + ("of constant volume" if control == "volume" else "at constant pressure")
+    held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}
+    among = f"axisymmetric perturbations {held[control]}"
     reason = {
         True: f"stable: energy rises under all {among} (smallest eigenvalue {found.value:.6g})",
         False: f"unstable: energy falls in {found.negative} direction(s) among {among} (smallest eigenvalue {found.value:.6g})",
@@ -110,7 +122,7 @@ def mode_shape(space: Space, mode: Array) -> dict[str, Array]:
     return {"r": space.mesh.position(s)[0], "u": u, "w": w}
 
 
-def _compressed(potential: Potential, evaluation: Evaluation) -> tuple[float, float] | None:
+def compressed(potential: Potential, evaluation: Evaluation) -> tuple[float, float] | None:
     """Interval of reference radii with meridional compression."""
     meridional = evaluation.stress[0]
     bad = meridional < -_COMPRESSION * np.abs(evaluation.stress).max(initial=0.0)

@@ -1,0 +1,358 @@
+"""Branches on disk: NetCDF files that hold a computation whole, and the one way in which the package writes files.
+
+A file is one data set with the dimensions ``step`` (equilibria), ``node`` (points along the meridian), ``coefficient`` (the state) and,
+when the branch was searched for them, ``special_point``. The state is kept to the last bit, so that a loaded equilibrium is the one that
+was saved; everything else in the file can be read without this package.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from importlib import metadata
+from os import PathLike, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, Status
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..scene import Scene
+    from ..stability.verdict import Verdict
+    from .records import Branch, Equilibrium, SpecialPoint
+
+FORMAT = 1
+
+#: long_name and units (1: non-dimensional) of every quantity that appears in a file
+MEANING: Mapping[str, tuple[str, str]] = {
+    "step": ("number of the equilibrium along the branch", "1"),
+    "volume": ("enclosed volume V/R0^3, signed", "1"),
+    "pressure": ("pressure P = p R0/(mu T)", "1"),
+    "center_height": ("height of the pole over R0", "1"),
+    "elastic_energy": ("elastic energy over mu T R0^2", "1"),
+    "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
+    "residual": ("out-of-balance force relative to the forces in balance", "1"),
+    "iterations": ("solver iterations, rejected attempts included", "1"),
+    "seconds": ("wall time spent on the equilibrium", "s"),
+    "status": ("how the solve ended", "1"),
+    "state": ("displacement coefficients over R0 on the free degrees of freedom", "1"),
+    "r": ("reference radius of the node over R0", "1"),
+    "rho": ("deformed radius over R0", "1"),
+    "eta": ("deformed height over R0", "1"),
+    "stretch_1": ("meridional stretch", "1"),
+    "stretch_2": ("circumferential stretch", "1"),
+    "mechanical_stress_1": ("meridional mechanical stress over mu", "1"),
+    "mechanical_stress_2": ("circumferential mechanical stress over mu", "1"),
+    "total_stress_1": ("meridional total stress over mu", "1"),
+    "total_stress_2": ("circumferential total stress over mu", "1"),
+    "kind": ("kind of the special point", "1"),
+    "error": ("uncertainty of the special point's location", "1"),
+}
+
+Array = NDArray[np.float64]
+#: a variable of a data set: dimensions and values
+_Variable = tuple[tuple[str, ...], Any]
+
+_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "seconds")
+_SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error")
+_AT_SPECIAL = "special_equilibrium_"
+_STABLE = {"stable": True, "unstable": False, "marginal": None}
+#: in place of a number of negative directions that was not determined
+_UNCOUNTED = -1
+
+
+@contextmanager
+def replace_file(path: str | PathLike[str]) -> Iterator[Path]:
+    """Write a file whole or not at all.
+
+    Yields the name of a temporary file in the same folder, with the same suffix. When the block ends well it takes the place of ``path``
+    in one step; when the block raises, ``path`` stays as it was and the temporary file is gone.
+
+    Raises
+    ------
+    InputError
+        When the folder does not exist or cannot be written to.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    try:
+        yield temporary
+        replace(temporary, path)
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
+        raise InputError("path", str(path), f"a file in an existing, writable folder is needed ({error.strerror})") from error
+    finally:
+        if temporary.parent.is_dir():
+            temporary.unlink(missing_ok=True)
+
+
+def to_xarray(branch: Branch) -> xarray.Dataset:
+    """The branch as one data set: the columns of the table, the profiles at the nodes, the states and the special points.
+
+    Every variable has ``long_name`` and ``units``; the scene is in the attributes as TOML text.
+    """
+    import xarray
+
+    width = branch[0].state.size if len(branch) else 0
+    variables = {**_table_variables(branch), **_equilibrium_variables(list(branch), width, "step"), **_profile_variables(branch)}
+    for tag, control, azimuthal in _asked(branch.scene):
+        variables |= _verdict_variables(tag, [e.verdict(control, azimuthal=azimuthal) for e in branch])
+    if branch.special_points is not None:
+        variables |= _special_variables(branch.special_points, width)
+    described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
+    coordinates = {name: described.pop(name) for name in ("step", "r") if name in described}
+    return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
+
+
+def save(branch: Branch, path: str | PathLike[str]) -> None:
+    """Write a branch to a NetCDF file, from which :func:`load` brings it back to the last bit."""
+    dataset = to_xarray(branch)
+    encoding = {
+        str(name): {"_FillValue": None, **({"zlib": True, "complevel": 1, "shuffle": True} if variable.ndim == 2 and variable.size else {})}
+        for name, variable in dataset.variables.items()
+        if variable.dtype.kind == "f"
+    }
+    with replace_file(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+
+
+def load(path: str | PathLike[str]) -> Branch:
+    """Bring a saved branch back, without solving anything.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, is not one of ours, or has a newer format.
+    """
+    dataset = _read(path)
+    try:
+        scene = scene_from_text(dataset.attrs["scene"])
+        return _branch(dataset, scene)
+    except (KeyError, ValueError) as error:
+        raise InputError("path", str(path), f"a complete file written by femmembrane is needed ({error})") from error
+
+
+def scene_text(scene: Scene) -> str:
+    """The scene as the text of a TOML file."""
+    import tomli_w
+
+    return tomli_w.dumps(scene.to_dict())
+
+
+def scene_from_text(text: str) -> Scene:
+    """The scene of a TOML text."""
+    from ..scene import Scene
+
+    return Scene.from_dict(tomllib.loads(text))
+
+
+def package_version(name: str = "femmembrane") -> str:
+    """Version of an installed distribution, or ``unknown`` (a source tree that was never installed)."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _table_variables(branch: Branch) -> dict[str, _Variable]:
+    from .table import columns, rows
+
+    names, table = columns(branch), list(rows(branch))
+    cells = zip(*table, strict=True) if table else ([] for _ in names)
+    return {name: (("step",), _array(name, column)) for name, column in zip(names, cells, strict=True)}
+
+
+def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, _Variable]:
+    """What :func:`_equilibria` needs to build the records again; ``width`` is the length of their states."""
+    magnetic = any(e.scene.sources for e in equilibria)
+    scalars = [name for name in _SCALARS if magnetic or name != "magnetic_energy"]
+    return {
+        **{prefix + name: ((dimension,), _array(name, (getattr(e, name) for e in equilibria))) for name in scalars},
+        prefix + "iterations": ((dimension,), _array("iterations", (e.iterations for e in equilibria))),
+        prefix + "status": ((dimension,), _array("status", (e.status.value for e in equilibria))),
+        prefix + "state": ((dimension, "coefficient"), np.array([e.state for e in equilibria]).reshape(len(equilibria), width)),
+    }
+
+
+def _profile_variables(branch: Branch) -> dict[str, _Variable]:
+    profiles = [e.profile() for e in branch]
+    if not profiles:
+        return {}
+    values = {key: (("step", "node"), np.array([p[key] for p in profiles])) for key in profiles[0] if key != "r"}
+    return {"r": (("node",), np.array(profiles[0]["r"])), **values}
+
+
+def _asked(scene: Scene) -> list[tuple[str, str | None, int]]:
+    """(name in columns, control, azimuthal) of the verdicts that a scene asks for."""
+    return [*((c, c, 0) for c in scene.analysis.stability), *((f"n{n}", None, n) for n in scene.analysis.azimuthal_modes)]
+
+
+def _verdict_variables(tag: str, verdicts: Sequence[Verdict]) -> dict[str, _Variable]:
+    """All of the verdicts of one class that the columns of the table leave out, and :func:`_verdicts` needs to build them again."""
+    from .table import verdict_text
+
+    counts = (_UNCOUNTED if v.negative_directions is None else v.negative_directions for v in verdicts)
+    variables: dict[str, _Variable] = {
+        f"verdict_{tag}": (("step",), _array("verdict_", (verdict_text(v) for v in verdicts))),
+        f"lambda_error_{tag}": (("step",), _array("error", (v.error for v in verdicts))),
+        f"negative_directions_{tag}": (("step",), _array("negative_directions", counts)),
+        f"reason_{tag}": (("step",), _array("reason", (v.reason for v in verdicts))),
+    }
+    shapes = [_shape(v) for v in verdicts]
+    for key, known in next((s for s in shapes if s), {}).items():
+        dimension = f"coefficient_{tag}" if key == "coefficients" else "node"
+        variables[f"mode_{tag}_{key}"] = (("step", dimension), np.array([s.get(key, np.full_like(known, np.nan)) for s in shapes]))
+    return variables
+
+
+def _shape(verdict: Verdict) -> dict[str, Array]:
+    """The mode of a verdict by component, empty without a mode; its radii are those of the profile's nodes."""
+    mode = verdict.mode
+    if mode is None or verdict.coefficients is None:
+        return {}
+    return {**{key: values for key, values in mode.items() if key != "r"}, "coefficients": verdict.coefficients}
+
+
+def _special_variables(points: Sequence[SpecialPoint], width: int) -> dict[str, _Variable]:
+    numbers = {f"special_{name}": (("special_point",), _array(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
+    kinds: dict[str, _Variable] = {"special_kind": (("special_point",), _array("kind", (str(p.kind) for p in points)))}
+    return {**kinds, **numbers, **_equilibrium_variables([p.equilibrium for p in points], width, "special_point", _AT_SPECIAL)}
+
+
+def _array(name: str, values: Iterable[Any]) -> NDArray[Any]:
+    """Values of a column in the type that the file gives it, whatever their number."""
+    if name in ("step", "iterations", "negative_directions"):
+        return np.array(list(values), dtype=np.int64)
+    if name in ("status", "kind", "reason") or name.startswith("verdict_"):
+        return np.array(list(values), dtype=str)
+    return np.array(list(values), dtype=np.float64)
+
+
+def _describe(name: str) -> dict[str, str]:
+    base = name.removeprefix(_AT_SPECIAL).removeprefix("special_")
+    meaning, unit = MEANING.get(base) or (_about_verdict(base), "1")
+    return {"long_name": meaning if base == name else f"{meaning}, at the special point", "units": unit}
+
+
+def _about_verdict(name: str) -> str:
+    """What a variable that belongs to a verdict means: its name ends in a control or in n and the number of waves."""
+    about = {
+        "lambda_error": "bound on the algebraic error of the smallest eigenvalue",
+        "lambda": "smallest eigenvalue, omega^2 rho_m R0^2/mu",
+        "verdict": "stability",
+        "negative_directions": f"number of negative eigenvalues ({_UNCOUNTED}: not counted)",
+        "reason": "reason of the verdict",
+        "mode": "shape of the smallest eigenvalue's mode (none: NaN)",
+    }
+    kind = next((k for k in about if name.startswith(k + "_")), "")
+    tag, _, part = name.removeprefix(kind + "_").partition("_")
+    against = f"azimuthal mode n = {tag[1:]}" if tag[1:].isdigit() else f"axisymmetric shapes under {tag} control"
+    return f"{about[kind]}, {against}" + (f": {part}" if part else "") if kind else name
+
+
+def _attributes(branch: Branch) -> dict[str, Any]:
+    return {
+        "title": branch.scene.title or "Equilibria of an inflated membrane",
+        "femmembrane_version": package_version(),
+        "format": FORMAT,
+        "status": branch.status.value,
+        "message": branch.message,
+        "timings": json.dumps(branch.timings),
+        "scene": scene_text(branch.scene),
+    }
+
+
+def _read(path: str | PathLike[str]) -> xarray.Dataset:
+    import xarray
+
+    try:
+        # the values as they stand: no times, masks or scales are in our files
+        dataset = xarray.load_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False)
+    except (OSError, ValueError) as error:
+        raise InputError("path", str(path), f"a NetCDF file written by femmembrane is needed ({error})") from error
+    if not {"format", "femmembrane_version", "scene"} <= set(dataset.attrs):
+        raise InputError("path", str(path), "a NetCDF file written by femmembrane is needed; this one comes from elsewhere")
+    if dataset.attrs["format"] != FORMAT:
+        found = dataset.attrs["format"]
+        raise InputError("path", str(path), f"format {FORMAT} is needed; this file has format {found}: use the version that wrote it")
+    return dataset
+
+
+def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
+    from .records import Branch, SpecialPoint
+
+    special = None
+    if "special_kind" in dataset:
+        kinds = [str(k) for k in dataset["special_kind"].values]
+        numbers = zip(*(dataset[f"special_{name}"].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
+        states = _equilibria(dataset, scene, _AT_SPECIAL)
+        special = tuple(
+            SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e)
+            for k, n, e in zip(kinds, numbers, states, strict=True)
+        )
+    equilibria = tuple(_equilibria(dataset, scene))
+    for tag, control, azimuthal in _asked(scene):
+        for equilibrium, verdict in zip(equilibria, _verdicts(dataset, tag, control, azimuthal), strict=True):
+            equilibrium._verdicts[control, azimuthal] = verdict
+    return Branch(
+        scene=scene,
+        equilibria=equilibria,
+        special_points=special,
+        status=Status(dataset.attrs["status"]),
+        message=str(dataset.attrs["message"]),
+        timings=json.loads(dataset.attrs["timings"]),
+    )
+
+
+def _equilibria(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> list[Equilibrium]:
+    from .records import Equilibrium
+
+    states = np.array(dataset[prefix + "state"].values, dtype=np.float64)
+    states.flags.writeable = False
+    scalars = {name: dataset[prefix + name].values.tolist() for name in _SCALARS if prefix + name in dataset}
+    scalars.setdefault("magnetic_energy", [0.0] * len(states))
+    return [
+        Equilibrium(
+            **{name: values[k] for name, values in scalars.items()},
+            iterations=int(dataset[prefix + "iterations"].values[k]),
+            status=Status(str(dataset[prefix + "status"].values[k])),
+            scene=scene,
+            state=states[k],
+        )
+        for k in range(len(states))
+    ]
+
+
+def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal: int) -> Iterator[Verdict]:
+    from ..stability.verdict import Verdict
+
+    parts = {str(name).removeprefix(f"mode_{tag}_"): v.values for name, v in dataset.items() if str(name).startswith(f"mode_{tag}_")}
+    for k in range(dataset.sizes["step"]):
+        mode = {"r": dataset["r"].values, **{key: values[k] for key, values in parts.items()}}
+        coefficients = mode.pop("coefficients", None)
+        known = coefficients is not None and not np.isnan(coefficients).any()
+        count = int(dataset[f"negative_directions_{tag}"].values[k])
+        yield Verdict(
+            stable=_STABLE[str(dataset[f"verdict_{tag}"].values[k])],
+            smallest_eigenvalue=float(dataset[f"lambda_{tag}"].values[k]),
+            error=float(dataset[f"lambda_error_{tag}"].values[k]),
+            control=control,
+            azimuthal=azimuthal,
+            negative_directions=None if count == _UNCOUNTED else count,
+            reason=str(dataset[f"reason_{tag}"].values[k]),
+            coefficients=coefficients if known else None,
+            _shape=partial(_stored_shape, mode) if known else None,
+        )
+
+
+def _stored_shape(mode: Mapping[str, Array], _: Array) -> Mapping[str, Array]:
+    """In place of the function that finds the shape of a mode from its coefficients: the shape that was found."""
+    return mode

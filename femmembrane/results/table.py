@@ -1,0 +1,102 @@
+"""A branch as tables: one row an equilibrium, and only the columns that the scene asks for."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from .store import replace_file
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ..stability.verdict import Verdict
+    from .records import Branch, Equilibrium
+
+#: the order in which verdicts of the two controls are listed
+CONTROLS = ("pressure", "volume")
+SPECIAL_POINT_COLUMNS = ("kind", "volume", "pressure", "center_height", "error")
+
+
+def columns(branch: Branch) -> list[str]:
+    """Names of the columns of a branch, in the order of ``branch.csv``.
+
+    ``lambda_`` and ``verdict_`` exist for the controls in ``scene.analysis.stability``, ``lambda_n`` for the modes in
+    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources.
+    """
+    scene = branch.scene
+    controls = [c for c in CONTROLS if c in scene.analysis.stability]
+    return [
+        *("step", "volume", "pressure", "center_height", "elastic_energy"),
+        *(["magnetic_energy"] if scene.sources else []),
+        *(f"lambda_{c}" for c in controls),
+        *(f"verdict_{c}" for c in controls),
+        *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),
+        *("residual", "iterations", "seconds"),
+    ]
+
+
+def verdict_text(verdict: Verdict) -> str:
+    """One of ``stable``, ``unstable`` and ``marginal``."""
+    return "marginal" if verdict.stable is None else "stable" if verdict.stable else "unstable"
+
+
+def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str:
+    """One cell: what a column says about the equilibrium at a step."""
+    if column == "step":
+        return step
+    kind, _, name = column.partition("_")
+    if kind == "verdict":
+        return verdict_text(equilibrium.verdict(name))
+    if kind == "lambda":
+        verdict = equilibrium.verdict(azimuthal=int(name[1:])) if name[1:].isdigit() else equilibrium.verdict(name)
+        return float(verdict.smallest_eigenvalue)
+    if column == "iterations":
+        return int(equilibrium.iterations)
+    return float(getattr(equilibrium, column))
+
+
+def rows(branch: Branch) -> Iterator[list[float | int | str]]:
+    """The rows of the table, in the order of :func:`columns`."""
+    names = columns(branch)
+    for step, equilibrium in enumerate(branch):
+        yield [value(equilibrium, step, name) for name in names]
+
+
+def write_csv(branch: Branch, path: str | PathLike[str]) -> None:
+    """Write :func:`rows` under a header line; numbers keep their full double precision."""
+    _write(path, columns(branch), rows(branch))
+
+
+def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
+    """One row (kind, volume, pressure, center_height, error) for each special point of the branch."""
+    for point in branch.special_points or ():
+        yield [str(point.kind), *(_number(getattr(point, name)) for name in SPECIAL_POINT_COLUMNS[1:])]
+
+
+def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:
+    """Write the special points; no rows means that the branch was searched and has none."""
+    _write(path, list(SPECIAL_POINT_COLUMNS), special_point_rows(branch))
+
+
+def to_dataframe(branch: Branch) -> pandas.DataFrame:
+    """The table as a pandas data frame with the columns of ``branch.csv``."""
+    import pandas
+
+    return pandas.DataFrame(list(rows(branch)), columns=columns(branch))
+
+
+def _number(number: Any) -> Any:
+    return number if number is None else float(number)
+
+
+def _write(path: str | PathLike[str], header: list[str], body: Iterator[list[Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")  # writes floats by repr, so that they read back to the last bit
+    writer.writerow(header)
+    writer.writerows(body)
+    with replace_file(path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")

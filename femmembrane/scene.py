@@ -1,0 +1,542 @@
+"""What exists and what is asked of it: one frozen value, to and from TOML.
+
+A scene file has one table for each part; the keys of a table are the arguments of a class, or attributes of :class:`Scene`::
+
+    title                        Scene.title
+    [material]  model, ...       a class of MATERIALS and its arguments
+    [membrane]                   attributes of Scene, listed in SCENE_KEYS
+    [[source]]  kind, ...        a class of SOURCES and its arguments
+    [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
+    [run]                        Run
+    [analysis]                   Analysis
+
+A new model, source or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
+Values are checked where the objects are made, so that files and Python code meet the same errors, named by their key in a file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from numbers import Real
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .discretization.meridian import Disc, Meridian, disc
+from .errors import InputError, unknown_name
+from .physics.magnetics import Dipole, Source
+from .physics.materials import Material, NeoHookean, Ogden
+
+MATERIALS: dict[str, Any] = {"neo-hookean": NeoHookean, "ogden": Ogden}
+SOURCES: dict[str, Any] = {"dipole": Dipole}
+SHAPES: dict[str, Any] = {"disc": Disc}
+CONTROLS = ("volume", "pressure", "height", "arc-length")
+AT_LIMIT = ("stop", "jump")
+SOLVERS = ("ipopt", "newton")
+VERDICTS = ("pressure", "volume")
+QUANTITIES = ("volume", "pressure", "center_height")
+SCENE_KEYS: dict[str, tuple[str, ...]] = {"membrane": ("susceptibility", "radius_to_thickness"), "mesh": ("degree",)}
+
+MAX_DEGREE = 8
+_MAX_STEPS = 400
+
+
+class Target(Mapping[str, float]):
+    """Where a branch ends: a mapping of one quantity to one value, hashable."""
+
+    def __init__(self, quantity: str, value: float) -> None:
+        self._item = (quantity, value)
+
+    def __getitem__(self, key: str) -> float:
+        if key != self._item[0]:
+            raise KeyError(key)
+        return self._item[1]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._item[:1])
+
+    def __len__(self) -> int:
+        return 1
+
+    def __hash__(self) -> int:
+        return hash(self._item)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+@dataclass(frozen=True)
+class Run:
+    """The equilibria that are asked for.
+
+    Parameters
+    ----------
+    control : {"volume", "pressure", "height", "arc-length"}
+        What is prescribed at each equilibrium.
+    start, stop : float, optional
+        First and last load; with arc length, ``start`` is the volume of the first equilibrium and ``stop`` is not used.
+    steps : int, optional
+        Number of equilibria from start to stop, both included (one: start alone).
+    values : sequence of float, optional
+        The loads one by one, in place of start, stop and steps.
+    until : mapping of one quantity to its value, optional
+        Where an arc-length run ends: one of ``volume``, ``pressure``, ``center_height``.
+    max_steps : int
+        Most steps of an arc-length run.
+    solver : {"ipopt", "newton"}
+        Who solves under volume and pressure control; a height and arc length always take the bordered Newton corrector.
+    at_limit : {"stop", "jump"}
+        Under volume and pressure control, where the branch turns back before a load: end there, or snap to the next stable state.
+
+    Raises
+    ------
+    InputError
+        For a value outside these sets, and for keys that do not go together.
+    """
+
+    control: str = "volume"
+    start: float | None = None
+    stop: float | None = None
+    steps: int | None = None
+    values: tuple[float, ...] | None = None
+    until: Mapping[str, float] | None = None
+    max_steps: int = _MAX_STEPS
+    solver: str = "ipopt"
+    at_limit: str = "stop"
+
+    def __post_init__(self) -> None:
+        _choice("run.control", self.control, CONTROLS)
+        self._check_keys()
+        _choice("run.solver", self.solver, SOLVERS)
+        _choice("run.at_limit", self.at_limit, AT_LIMIT)
+        _convert(
+            self,
+            start=_optional(_number, "run.start", self.start),
+            stop=_optional(_number, "run.stop", self.stop),
+            steps=_optional(_whole, "run.steps", self.steps),
+            values=_optional(_loads, "run.values", self.values),
+            until=_optional(_target, "run.until", self.until),
+            max_steps=_whole("run.max_steps", self.max_steps),
+        )
+
+    def loads(self) -> NDArray[np.float64]:
+        """The prescribed volumes or pressures, shape (number of equilibria,)."""
+        if self.values is not None:
+            return np.array(self.values)
+        if self.start is None or self.stop is None or self.steps is None:
+            raise InputError(
+                "run.control", self.control, "its loads are found on the way; only volume and pressure control have a list of loads"
+            )
+        return np.linspace(self.start, self.stop, self.steps)
+
+    def _check_keys(self) -> None:
+        by_length = self.control == "arc-length"
+        needed: tuple[str, ...] = (
+            ("start", "until") if by_length else ("values",) if self.values is not None else ("start", "stop", "steps")
+        )
+        advice = (
+            "arc-length control takes start and until" if by_length else f"{self.control} control takes start, stop and steps, or values"
+        )
+        for name in ("start", "stop", "steps", "values", "until"):
+            value = getattr(self, name)
+            if value is not None and name not in needed:
+                beside = ", not together with run.values" if needed == ("values",) and name != "until" else ""
+                raise InputError(f"run.{name}", value, advice + beside)
+        for name in needed:
+            if getattr(self, name) is None:
+                raise InputError(f"run.{name}", None, f"missing; {advice}")
+        if self.max_steps != _MAX_STEPS and not by_length:
+            raise InputError("run.max_steps", self.max_steps, f"only arc-length control takes it; {advice}")
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Questions asked of every equilibrium; only what is asked for is computed.
+
+    Parameters
+    ----------
+    stability : sequence of {"pressure", "volume"}
+        Controls under which the verdict on axisymmetric perturbations is given.
+    azimuthal_modes : sequence of int
+        Circumferential wave numbers n >= 1 for which the verdict is given.
+
+    Raises
+    ------
+    InputError
+        For a value outside these sets or given twice.
+    """
+
+    stability: tuple[str, ...] = ()
+    azimuthal_modes: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        stability = _sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure" and "volume"')
+        modes = _sequence("analysis.azimuthal_modes", self.azimuthal_modes, "a list of whole numbers >= 1 is allowed")
+        for k, name in enumerate(stability):
+            _choice(f"analysis.stability[{k}]", name, VERDICTS)
+        modes = tuple(_whole(f"analysis.azimuthal_modes[{k}]", n) for k, n in enumerate(modes))
+        _unique("analysis.stability", stability)
+        _unique("analysis.azimuthal_modes", modes)
+        _convert(self, stability=stability, azimuthal_modes=modes)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A membrane, its surroundings, its mesh and what is asked of it; hashable, never changed once made.
+
+    Parameters
+    ----------
+    material : Material
+        Strain energy: :class:`~femmembrane.physics.materials.Ogden`, ``NeoHookean``, or an object with their methods.
+    mesh : Meridian
+        Reference meridian and its elements.
+    degree : int
+        Polynomial degree of the elements, 1 to 8.
+    sources : sequence of Source
+        Magnetic sources on the axis; none: nothing magnetic is built.
+    susceptibility : float, optional
+        Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
+    radius_to_thickness : float
+        R0/T > 0; enters the total stresses only.
+    title : str
+    run : Run, optional
+        Equilibria that :func:`femmembrane.run` computes.
+    analysis : Analysis
+
+    Raises
+    ------
+    InputError
+        For a value that cannot be used, named by its key in a scene file (``mesh.elements``).
+    """
+
+    material: Material
+    mesh: Meridian = field(default_factory=disc)
+    degree: int = 2
+    sources: tuple[Source, ...] = ()
+    susceptibility: float | None = None
+    radius_to_thickness: float = 1000.0
+    title: str = ""
+    run: Run | None = None
+    analysis: Analysis = field(default_factory=Analysis)
+
+    def __post_init__(self) -> None:
+        _require("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
+        _require("mesh", self.mesh, ("breakpoints", "position", "tangent", "supports"), "a mesh is allowed, such as disc(elements=64)")
+        _require("run", self.run, () if self.run is None else ("loads",), "a Run is allowed")
+        _require("analysis", self.analysis, ("stability", "azimuthal_modes"), "an Analysis is allowed")
+        sources = _sequence("source", self.sources, "a list of sources is allowed, such as [Dipole(strength=..., height=...)]")
+        positive = "a finite number > 0 is allowed (R0 over the reference thickness)"
+        _convert(
+            self,
+            degree=_whole("mesh.degree", self.degree, most=MAX_DEGREE),
+            sources=sources,
+            susceptibility=_optional(_susceptibility, "membrane.susceptibility", self.susceptibility),
+            radius_to_thickness=_number("membrane.radius_to_thickness", self.radius_to_thickness, positive, above=0),
+            title=_text("title", self.title),
+        )
+        self._check_sources()
+
+    def _check_sources(self) -> None:
+        R, Z = self.mesh.position(self.mesh.breakpoints())
+        for k, source in enumerate(self.sources):
+            path = _source_path(k, len(self.sources))
+            _require(path, source, ("field",), "a source is allowed, such as Dipole(strength=..., height=...)")
+            # sources stand on the axis, which a meridian meets at its ends only: its breakpoints are enough
+            with np.errstate(all="ignore"):
+                finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
+            if not finite:
+                height = getattr(source, "height", source)
+                raise InputError(f"{path}.height", height, "the source lies on the membrane, where its field is singular; move it off")
+        if self.sources and self.susceptibility is None:
+            raise InputError(
+                "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"
+            )
+
+    def replace(self, **changes: Any) -> Self:
+        """The same scene with some attributes changed, checked anew."""
+        known = [f.name for f in fields(self)]
+        for name, value in changes.items():
+            if name not in known:
+                raise InputError(name, value, unknown_name(name, name, known).allowed)
+        return dataclasses.replace(self, **changes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as nested dictionaries of plain values: the tables of a scene file.
+
+        Raises
+        ------
+        InputError
+            When a material, source or mesh has no name in scene files.
+        """
+        tables: dict[str, Any] = {
+            "title": self.title,
+            "material": _describe("material", "model", MATERIALS, self.material),
+            **{table: {name: getattr(self, name) for name in names} for table, names in SCENE_KEYS.items() if table != "mesh"},
+            "source": [_describe("source", "kind", SOURCES, source) for source in self.sources],
+            "mesh": {**_describe("mesh", "shape", SHAPES, self.mesh), **{name: getattr(self, name) for name in SCENE_KEYS["mesh"]}},
+            "run": _arguments(self.run) if self.run else {},
+            "analysis": _arguments(self.analysis),
+        }
+        if self.run and self.run.control != "arc-length":
+            del tables["run"]["max_steps"]
+        plain: dict[str, Any] = _plain(tables)
+        return {name: table for name, table in plain.items() if table not in ("", {}, [])}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """The scene that the tables of a scene file describe.
+
+        Raises
+        ------
+        InputError
+            For an unknown table or key (with the nearest valid name), a missing one, or a value that cannot be used.
+        """
+        if not isinstance(data, Mapping):
+            raise InputError("scene", data, "a mapping of the tables of a scene file is allowed")
+        _refuse_unknown("", data, ("title", *_known_keys()))
+        tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name != "source"}
+        arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
+        for table in SCENE_KEYS.keys() - {"mesh"}:
+            _refuse_unknown(table, tables[table], SCENE_KEYS[table])
+        return cls(
+            material=_build_one_of("material", "model", MATERIALS, tables["material"]),
+            sources=_build_sources(data.get("source", ())),
+            mesh=_build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **tables["mesh"]}, beside=SCENE_KEYS["mesh"]),
+            run=_build("run", Run, tables["run"]) if "run" in data else None,
+            analysis=_build("analysis", Analysis, tables["analysis"]),
+            title=data.get("title", ""),
+            **arguments,
+        )
+
+    @classmethod
+    def from_toml(cls, path: str | PathLike[str]) -> Self:
+        """Read a scene file.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be read, is no TOML (with the line), or does not describe a scene.
+        """
+        return cls.from_dict(_read_toml(Path(path)))
+
+    def to_toml(self, path: str | PathLike[str]) -> None:
+        """Write a scene file that :meth:`from_toml` reads back to an equal scene.
+
+        Raises
+        ------
+        InputError
+            When a material, source or mesh has no name in scene files.
+        OSError
+            When the file cannot be written.
+        """
+        import tomli_w
+
+        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8", newline="\n")
+
+
+# --- reading and writing tables
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a null character in the path
+        if isinstance(error, UnicodeDecodeError):
+            line = error.object.count(b"\n", 0, error.start) + 1
+            raise InputError("scene", str(path), f"not UTF-8 text (line {line}); a scene file (TOML, UTF-8) is allowed") from None
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError("scene", str(path), f"cannot be read ({reason}); the path of a scene file (TOML) is allowed") from None
+    try:
+        return tomllib.loads(text.replace("\r\n", "\n"))
+    except RecursionError:
+        raise InputError("scene", str(path), "not a scene file: nested too deeply") from None
+    except ValueError as error:
+        where = f"at line {text.rstrip().count(chr(10)) + 1}, the end of the file"
+        raise InputError("scene", str(path), "not valid TOML: " + re.sub("at end of document", where, str(error))) from None
+
+
+def _known_keys() -> dict[str, set[str]]:
+    """Keys of every table."""
+
+    def arguments(*classes: Any) -> set[str]:
+        return {f.name for c in classes for f in fields(c)}
+
+    keys = {table: set(names) for table, names in SCENE_KEYS.items()}
+    keys["material"] = {"model"} | arguments(*MATERIALS.values())
+    keys["source"] = {"kind"} | arguments(*SOURCES.values())
+    keys["mesh"] |= {"shape"} | arguments(*SHAPES.values())
+    return keys | {"run": arguments(Run), "analysis": arguments(Analysis)}
+
+
+def _refuse_unknown(path: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
+    for name, value in table.items():
+        if name not in known:
+            key = f"{path}.{name}" if path else str(name)
+            homes = [f"[{home}]" for home, keys in sorted(_known_keys().items()) if name in keys and home != path.split("[")[0]]
+            hint = f"; {name} belongs in {' or '.join(homes)}" if homes else ""
+            raise InputError(key, value, unknown_name(key, name, known).allowed + hint)
+
+
+def _table(name: str, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(name, value, f"a table is allowed: [{name}] with its keys below")
+    return value
+
+
+def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
+    """The object of a class from a table with its arguments; ``beside`` are further keys of the table that others read."""
+    names = tuple(f.name for f in fields(cls))
+    _refuse_unknown(path, table, (*beside, *names))
+    for f in fields(cls):
+        if f.name not in table and f.default is f.default_factory is dataclasses.MISSING:
+            raise InputError(f"{path}.{f.name}", None, "missing; it has no default")
+    return cls(**{name: table[name] for name in names if name in table})
+
+
+def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
+    """The object of the class that a table names by its key ``selector``."""
+    if selector not in table:
+        raise InputError(f"{path}.{selector}", None, "missing; known: " + ", ".join(sorted(registry)))
+    _choice(f"{path}.{selector}", table[selector], registry)
+    return _build(path, registry[table[selector]], table, (selector, *beside))
+
+
+def _build_sources(tables: Any) -> tuple[Source, ...]:
+    if isinstance(tables, Mapping):
+        raise InputError("source", tables, "a list of tables is allowed: write [[source]], one for each source")
+    tables = _sequence("source", tables, "a list of tables is allowed: [[source]], one for each source")
+    sources = []
+    for k, table in enumerate(tables):
+        path = _source_path(k, len(tables))
+        if not isinstance(table, Mapping):
+            raise InputError(path, table, "a table is allowed: [[source]] with its keys below")
+        try:
+            sources.append(_build_one_of(path, "kind", SOURCES, table))
+        except InputError as error:  # a source does not know its place in the list
+            raise InputError(re.sub(r"^source(?=\.)", path, error.key), error.value, error.allowed) from None
+    return tuple(sources)
+
+
+def _source_path(index: int, count: int) -> str:
+    return "source" if count == 1 else f"source[{index}]"
+
+
+def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any) -> dict[str, Any]:
+    for name, cls in registry.items():
+        if type(value) is cls:
+            return {selector: name, **_arguments(value)}
+    raise InputError(f"{path}.{selector}", value, "it has no name in scene files; known: " + ", ".join(sorted(registry)))
+
+
+def _arguments(value: Any) -> dict[str, Any]:
+    return {f.name: getattr(value, f.name) for f in fields(value)}
+
+
+def _plain(value: Any) -> Any:
+    """Lists, dictionaries and Python numbers only; what is not given is left out, for TOML has no null."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None and item != ()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+# --- checks of single values, each returning the value in its one true type
+
+
+def _convert(target: Any, **values: Any) -> None:
+    for name, value in values.items():
+        object.__setattr__(target, name, value)
+
+
+def _optional(check: Any, key: str, value: Any) -> Any:
+    return None if value is None else check(key, value)
+
+
+def _number(
+    key: str, value: Any, allowed: str = "a finite number is allowed", *, least: float = -math.inf, above: float = -math.inf
+) -> float:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
+        raise InputError(key, value, allowed)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not (math.isfinite(number) and number >= least and number > above):
+        raise InputError(key, value, allowed)
+    return number
+
+
+def _whole(key: str, value: Any, *, most: int | None = None) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1 or (most is not None and value > most):
+        raise InputError(key, value, "a whole number >= 1 is allowed" if most is None else f"a whole number from 1 to {most} is allowed")
+    return int(value)
+
+
+def _susceptibility(key: str, value: Any) -> float:
+    return _number(key, value, "a finite number >= 0 is allowed (2.5 in the paper)", least=0)
+
+
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str) or not _encodes(value):
+        raise InputError(key, value, "a text (UTF-8) is allowed")
+    return value
+
+
+def _encodes(text: str) -> bool:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _sequence(key: str, values: Any, allowed: str) -> tuple[Any, ...]:
+    if isinstance(values, (str, bytes, Mapping)):
+        raise InputError(key, values, allowed)
+    try:
+        return tuple(values)
+    except TypeError:
+        raise InputError(key, values, allowed) from None
+
+
+def _loads(key: str, values: Any) -> tuple[float, ...]:
+    allowed = "a list of one or more finite numbers is allowed"
+    result = tuple(_number(f"{key}[{k}]", value) for k, value in enumerate(_sequence(key, values, allowed)))
+    if not result:
+        raise InputError(key, values, allowed)
+    return result
+
+
+def _target(key: str, value: Any) -> Target:
+    if not isinstance(value, Mapping) or len(value) != 1:
+        raise InputError(
+            key, value, "one quantity and its value are allowed, such as {center_height = 5.0}; known: " + ", ".join(QUANTITIES)
+        )
+    ((quantity, number),) = value.items()
+    _choice(key, quantity, QUANTITIES)
+    return Target(quantity, _number(f"{key}.{quantity}", number))
+
+
+def _choice(key: str, value: Any, known: Any) -> None:
+    if not isinstance(value, str) or value not in known:
+        raise unknown_name(key, value, known)
+
+
+def _unique(key: str, values: tuple[Any, ...]) -> None:
+    if len(set(values)) < len(values):
+        raise InputError(key, list(values), "each entry once is allowed")
+
+
+def _require(key: str, value: Any, names: tuple[str, ...], allowed: str) -> None:
+    # a class in place of its object (NeoHookean for NeoHookean()) has the methods, but nothing to call them on
+    if isinstance(value, type) or not all(hasattr(value, name) for name in names):
+        raise InputError(key, value, allowed)

@@ -1,0 +1,164 @@
+"""One number of a scene by its name, changed while everything else stays.
+
+======================== ==================================================================================================
+``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
+``membrane.susceptibility``  chi
+``material.NAME``        a number of a material that has such an argument
+``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
+``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
+======================== ==================================================================================================
+
+The two rules for Ogden's material keep the sum of mu alpha at 2, that is the shear modulus at 1, the unit of stress; the number that is
+named is always the one that the scene of a value holds.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from dataclasses import dataclass
+from numbers import Real
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..physics.materials import Ogden
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+#: added to a strength, so that its square root can be differentiated at zero; no strength above 1e-284 notices
+_TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        Its place, as listed above.
+
+    Raises
+    ------
+    InputError
+        For a name that the scene does not have.
+    """
+
+    scene: Scene
+    name: str
+
+    def __post_init__(self) -> None:
+        known = names(self.scene)
+        if not isinstance(self.name, str) or self.name not in known:
+            raise unknown_name("parameter", self.name, known or ["(this scene has no number to vary)"])
+        if self.name.startswith("material.mu.") and len(self.scene.material.mu) == 1:  # type: ignore[attr-defined]
+            raise InputError("parameter", self.name, "the only modulus is 2/alpha, fixed by the unit of stress; vary material.alpha.0")
+
+    @property
+    def value(self) -> float:
+        """The number in the scene given."""
+        part, _, rest = self.name.partition(".")
+        if part == "membrane":
+            return float(self.scene.susceptibility or 0.0)
+        place, _, name = rest.rpartition(".") if part == "source" else ("", "", rest)
+        owner = self.scene.sources[int(place)] if part == "source" else self.scene.material
+        key, _, index = name.partition(".")
+        number = getattr(owner, key)
+        return float(number[int(index)] if index else number)
+
+    def scene_at(self, value: float) -> Scene:
+        """The scene with this value, checked like any other.
+
+        Raises
+        ------
+        InputError
+            For a value that the scene cannot take.
+        """
+        part, _, rest = self.name.partition(".")
+        if part == "membrane":
+            return self.scene.replace(susceptibility=value)
+        if part == "material":
+            material: Any = self.scene.material
+            return self.scene.replace(material=dataclasses.replace(material, **self._material_numbers(rest, value)))
+        index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
+        sources: list[Any] = list(self.scene.sources)
+        sources[index] = dataclasses.replace(sources[index], **{name: value})
+        return self.scene.replace(sources=tuple(sources))
+
+    def vary(self, value: Any) -> Any:
+        """The parts of the scene at a value that may be a symbol: nothing is checked, and nothing but formulas may use them."""
+        scene, (part, _, rest) = self.scene, self.name.partition(".")
+        material: Any = scene.material
+        sources: tuple[Any, ...] = scene.sources
+        susceptibility = scene.susceptibility
+        if part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
+            sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
+        elif part == "material":
+            material = _unchecked(material, **self._material_numbers(rest, value))
+        else:
+            index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
+            changed = [
+                _Scaled(_unchecked(s, strength=1.0), value) if name == "strength" else _unchecked(s, **{name: value}) for s in sources
+            ]
+            sources = (*sources[:index], changed[index], *sources[index + 1 :])
+        return SimpleNamespace(material=material, sources=sources, susceptibility=susceptibility, mesh=scene.mesh, degree=scene.degree)
+
+    def _material_numbers(self, rest: str, value: Any) -> dict[str, Any]:
+        name, _, index = rest.partition(".")
+        if not index:
+            return {name: value}
+        material: Any = self.scene.material
+        k, mu, alpha = int(index), list(material.mu), list(material.alpha)
+        if name == "alpha":
+            mu[k] = mu[k] * alpha[k] / value
+            alpha[k] = value
+        else:
+            others = sum(m * a for j, (m, a) in enumerate(zip(mu, alpha, strict=True)) if j != k)
+            share = (2 - value * alpha[k]) / others
+            mu = [value if j == k else m * share for j, m in enumerate(mu)]
+        return {"mu": tuple(mu), "alpha": tuple(alpha)}
+
+
+def names(scene: Scene) -> list[str]:
+    """Names of all numbers of a scene that can be varied."""
+    found = [f"source.{k}.{name}" for k, source in enumerate(scene.sources) for name in _numbers(source)]
+    if scene.sources:
+        found.append("membrane.susceptibility")
+    material = scene.material
+    if isinstance(material, Ogden):
+        return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]
+    return found + [f"material.{name}" for name in _numbers(material)]
+
+
+def _numbers(owner: Any) -> list[str]:
+    """The real arguments of an object; one declared as int (an orientation, a count) cannot vary continuously."""
+    if not dataclasses.is_dataclass(owner):
+        return []
+    real = [f.name for f in dataclasses.fields(owner) if f.init and f.type in ("float", float)]
+    return [name for name in real if isinstance(getattr(owner, name), Real)]
+
+
+def _unchecked(owner: Any, **changes: Any) -> Any:
+    """A copy of a frozen object with some attributes replaced behind its back, so that they may be symbols."""
+    new = copy.copy(owner)
+    for name, value in changes.items():
+        object.__setattr__(new, name, value)
+    return new
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """A source whose field is multiplied by the square root of a factor."""
+
+    source: Any
+    factor: Any
+
+    def field(self, rho: Any, eta: Any) -> tuple[Any, Any]:
+        h_rho, h_z = self.source.field(rho, eta)
+        amplitude = np.sqrt(self.factor + _TINY)
+        return amplitude * h_rho, amplitude * h_z

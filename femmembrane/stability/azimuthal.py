@@ -1,0 +1,521 @@
+"""Second variation against perturbations with n waves around the axis: wobbling, tipping sideways, wrinkling.
+
+::
+
+    u = (a cos n theta, c sin n theta, b cos n theta)        in (e_rho, e_theta, e_z),   a, c, b functions of the meridian
+
+Each n decouples from all others, so three functions on the meridian and one banded matrix describe a perturbation of the whole surface.
+With t the unit tangent of the deformed meridian, nu its normal, ' = d/dS along the reference meridian, and
+e = -(n a + c)/R, f = -n b/R, q = (a + n c)/R, the displacement gradient has the components (t, theta, nu)::
+
+    g1 = (t.(a', b'), c', nu.(a', b')),        g2 = (t.(e, f), q, nu.(e, f))
+
+and the quadratic form is, per reference area,
+
+    W_11 g1t^2 + 2 W_12 g1t g2th + W_22 g2th^2 + A (g1th^2 + g2t^2) + 2 B g1th g2t + W_1/l1 g1nu^2 + W_2/l2 g2nu^2
+    + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: magnetic energy density)
+
+with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
+2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Integrals over theta are normalised as for n = 0, 2 pi
+instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues do not depend on it. c plays no part at n = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+
+from ..discretization.space import Space
+from ..errors import InputError, unknown_name
+from ..physics.kinematics import hencky_strains
+from ..potential import Array, Potential
+from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
+from .verdict import _COMPRESSION, CONTROLS, Verdict
+
+#: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
+#: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
+EQUAL_STRETCH = 1e-3
+
+#: local variables (a, a_x, c, c_x, b, b_x); pairs (c_x, b_x), (a_x, c_x) and (b, b_x) never meet
+_A, _AX, _C, _CX, _B, _BX = range(6)
+_PAIRS = (
+    (_A, _A),
+    (_A, _AX),
+    (_A, _C),
+    (_A, _CX),
+    (_A, _B),
+    (_A, _BX),
+    (_AX, _AX),
+    (_AX, _C),
+    (_AX, _B),
+    (_AX, _BX),
+    (_C, _C),
+    (_C, _CX),
+    (_C, _B),
+    (_C, _BX),
+    (_CX, _CX),
+    (_CX, _B),
+    (_B, _B),
+    (_BX, _BX),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LocalResponse:
+    """Stretches, stresses, tangent moduli and magnetic derivatives at points of a deformed meridian.
+
+    Attributes
+    ----------
+    rho, eta, rho_x, eta_x : deformed position and slopes
+    t_rho, t_z : unit tangent
+    s1, s2 : principal mechanical stresses l_i W_i
+    W11, W12, W22 : second derivatives of the strain energy with respect to the stretches
+    N1, N2 : W_1/l1 and W_2/l2, the stiffness of rotation out of the surface
+    A, B : in-plane shear moduli, continuous through l1 = l2
+    field : ndarray, shape (6, ...)
+        m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta of the magnetic energy density.
+    """
+
+    rho: Array
+    eta: Array
+    rho_x: Array
+    eta_x: Array
+    t_rho: Array
+    t_z: Array
+    s1: Array
+    s2: Array
+    W11: Array
+    W12: Array
+    W22: Array
+    N1: Array
+    N2: Array
+    A: Array
+    B: Array
+    field: Array
+
+
+def local_response(potential: Potential, meridian: tuple[Array, ...], displacement: tuple[Array, ...]) -> LocalResponse:
+    """Response at points (R, R_x, Z, Z_x) of the reference meridian displaced by (u, u_x, w, w_x); R > 0 and any shape."""
+    R, R_x, Z, Z_x = meridian
+    u, u_x, w, w_x = displacement
+    shape = R.shape
+    rho, eta, rho_x, eta_x = R + u, Z + w, R_x + u_x, Z_x + w_x
+    e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
+    s1, s2, d11, d12, d22 = potential.response(e1, e2).reshape(5, *shape)
+    l1, l2 = np.exp(e1), np.exp(e2)
+    slope = np.hypot(rho_x, eta_x)
+    # l1^2 - l2^2 = 2 l1 l2 sinh d for d = e1 - e2
+    d = e1 - e2
+    A = _stress_quotient(potential, e1, e2, s1 - s2, d) * _over_sinh(d) / (2 * l1 * l2)
+    B = ((l1**2 + l2**2) / 2 * A - (s1 + s2) / 2) / (l1 * l2)
+    return LocalResponse(
+        rho=rho,
+        eta=eta,
+        rho_x=rho_x,
+        eta_x=eta_x,
+        t_rho=rho_x / slope,
+        t_z=eta_x / slope,
+        s1=s1,
+        s2=s2,
+        W11=(d11 - s1) / l1**2,
+        W12=d12 / (l1 * l2),
+        W22=(d22 - s2) / l2**2,
+        N1=s1 / l1**2,
+        N2=s2 / l2**2,
+        A=A,
+        B=B,
+        field=potential.field_energy(rho, eta).reshape(6, *shape),
+    )
+
+
+def _over_sinh(d: Array) -> Array:
+    """d/sinh d."""
+    safe = np.where(d == 0, 1.0, d)
+    return np.where(d == 0, 1.0, safe / np.sinh(safe))
+
+
+def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Array, d: Array) -> Array:
+    """(s_1 - s_2)/(e_1 - e_2), continuous through equal stretches.
+
+    For an isotropic material the difference g is odd in d at fixed mean strain, so g/d = Int_0^1 g'(t d) dt has an even integrand, and
+    one evaluation at t = 1/sqrt 3 is a Gauss rule of two points.
+    """
+    close = np.abs(d) < EQUAL_STRETCH
+    quotient: Array = difference / np.where(close, 1.0, d)
+    if close.any():
+        mean, half = (e1 + e2)[close] / 2, d[close] / np.sqrt(12)
+        _, _, d11, d12, d22 = potential.response(mean + half, mean - half)
+        quotient[close] = (d11 - 2 * d12 + d22) / 2
+    return quotient
+
+
+@dataclass(frozen=True, eq=False)
+class AzimuthalOperator:
+    """K and M of the perturbations with n waves around the axis.
+
+    Attributes
+    ----------
+    band, mass : ndarray, shape (3 kd + 1, n_free)
+        In LAPACK general band storage.
+    half_bandwidth : int
+        kd = 3 degree + 2 (2 degree + 1 for n = 0).
+    numbering : ndarray of int, shape (n_nodes, 3)
+        Unknown of (a, c, b) at each node along the meridian; n_free stands for what is held. On the axis at n = 1, c = -a share one.
+    n : int
+    response : LocalResponse
+        At the quadrature points, shape (n_quadrature, n_elements).
+    """
+
+    band: Array
+    mass: Array
+    half_bandwidth: int
+    numbering: NDArray[np.int64]
+    n: int
+    response: LocalResponse
+    space: Space
+
+    def shape(self, mode: Array) -> dict[str, Array]:
+        """A mode at the nodes, see :func:`azimuthal_shape`."""
+        return azimuthal_shape(self.space, self.n, mode)
+
+
+class _Layout:
+    """What depends on the space and on min(n, 2) alone: supports, numbering, tables, mass."""
+
+    def __init__(self, space: Space, kind: int) -> None:
+        degree, n_elements = space.degree, space.n_elements
+        n_nodes, n_local = degree * n_elements + 1, degree + 1
+        nodes = degree * np.arange(n_elements) + np.arange(n_local)[:, None]
+        free, opposite = _supports(space, kind, n_nodes)
+        self.n_free = int(free.sum())
+        self.numbers: NDArray[np.int64] = np.full((n_nodes, 3), self.n_free, dtype=np.int64)
+        self.numbers[free] = np.arange(self.n_free)
+        self.numbers[opposite, _C // 2] = self.numbers[opposite, _A // 2]
+        #: local row of c and element where c = -a on the axis
+        self.flips = [(n_local, 0) if node == 0 else (2 * n_local - 1, n_elements - 1) for node in opposite]
+        self.gather = np.concatenate([self.numbers[nodes, k] for k in range(3)])
+        self.half_bandwidth = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
+        self._tabulate(space)
+        area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        zero = np.zeros_like(area)
+        self.mass = self.assemble([area if i == j and i in (_A, _C, _B) else zero for i, j in _PAIRS])
+        self.mass.flags.writeable = False
+        points = (space.interpolation_points()[:, 0] - space.mesh.breakpoints()[0]) / np.diff(space.mesh.breakpoints())[0]
+        self.node_values = space.shape_functions(points)[0]
+
+    def _tabulate(self, space: Space) -> None:
+        n_local = space.degree + 1
+        rows = np.zeros((6, space.n_quadrature, 3 * n_local))
+        for field in range(3):
+            columns = slice(field * n_local, (field + 1) * n_local)
+            rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
+            rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
+        outer = []
+        for i, j in _PAIRS:
+            product = np.einsum("qa,qb->abq", rows[i], rows[j])
+            outer.append(product if i == j else product + product.transpose(1, 0, 2))
+        self._table = np.ascontiguousarray(np.stack(outer, axis=2).reshape((3 * n_local) ** 2, -1))
+        kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
+        row, column = np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :])
+        inside = (row < self.n_free) & (column < self.n_free)
+        self._band_index = np.where(inside, column * depth + 2 * kd + row - column, self.n_free * depth).ravel()
+
+    def assemble(self, density: list[Array]) -> Array:
+        """Integrate second derivatives in the order of _PAIRS, each of shape (n_quadrature, n_elements), to a band matrix."""
+        n_elements, n_local = density[0].shape[1], self.gather.shape[0]
+        local = (self._table @ np.stack(density).reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
+        for row, element in self.flips:
+            local[row, :, element] *= -1
+            local[:, row, element] *= -1
+        depth = 3 * self.half_bandwidth + 1
+        flat: Array = np.bincount(self._band_index, local.ravel(), self.n_free * depth + 1)  # type: ignore[assignment]  # weighted: floats
+        return flat[:-1].reshape(self.n_free, depth).T
+
+    def local(self, mode: Array) -> Array:
+        """Coefficients of (a, c, b) in each element, shape (3 (degree + 1), n_elements)."""
+        local = np.append(mode, 0.0)[self.gather]
+        for row, element in self.flips:
+            local[row, element] *= -1
+        return local
+
+
+@lru_cache(maxsize=32)
+def _layout(space: Space, kind: int) -> _Layout:
+    return _Layout(space, kind)
+
+
+def _supports(space: Space, kind: int, n_nodes: int) -> tuple[NDArray[np.bool_], list[int]]:
+    """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
+
+    What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
+    constant in-plane part at n = 1, and vanishes for larger n.
+    """
+    free = np.ones((n_nodes, 3), dtype=bool)
+    opposite = []
+    radius = space.mesh.position(space.mesh.breakpoints()[[0, -1]])[0]
+    for node, held, R in zip((0, n_nodes - 1), space.mesh.supports(), radius, strict=True):
+        in_plane, vertical = "u" not in held, "w" not in held
+        if abs(R) < 1e-12:
+            rigid = kind == 1 and vertical  # a pole that is held vertically is a fixed point
+            free[node] = [rigid, False, kind == 0 and vertical]
+            opposite += [node] if rigid else []
+        else:
+            free[node] = [in_plane, in_plane, vertical]
+    if kind == 0:
+        free[:, _C // 2] = False
+    return free, opposite
+
+
+def azimuthal_shape(space: Space, n: int, mode: Array) -> dict[str, Array]:
+    """A mode at the nodes along the meridian: r (reference radius), u (radial), c (circumferential), w (vertical)."""
+    layout = _layout(space, min(n, 2))
+    nodes = layout.node_values @ layout.local(mode).reshape(3, space.degree + 1, -1)
+    a, c, b = np.concatenate([nodes[:, :-1].transpose(0, 2, 1).reshape(3, -1), nodes[:, -1, -1:]], axis=1)
+    return {"r": space.mesh.position(space.node_parameters())[0], "u": a, "c": c, "w": b}
+
+
+def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) -> AzimuthalOperator:
+    """Second variation against n waves around the axis at an equilibrium (x, P).
+
+    Parameters
+    ----------
+    potential : Potential
+    x : ndarray, shape (n_free,)
+        Displacement coefficients of the axisymmetric state.
+    pressure : float
+    n : int
+        0 gives the axisymmetric operator under pressure control.
+
+    Raises
+    ------
+    InputError
+        For n that is no whole number >= 0.
+    """
+    _check_waves(n, 0)
+    space = potential.space
+    layout = _layout(space, min(n, 2))
+    response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
+    band = layout.assemble(_density(space, response, pressure, n))
+    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space)
+
+
+@lru_cache(maxsize=4)
+def _response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse:
+    """Remembered for the other n of the same state."""
+    space = potential.space
+    displacement = space.at_quadrature(np.frombuffer(state)).reshape(4, space.n_quadrature, -1)
+    return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement))
+
+
+def _check_waves(n: int, least: int) -> None:
+    if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < least:
+        raise InputError("azimuthal", n, f"a whole number >= {least} is allowed")
+
+
+def _density(space: Space, r: LocalResponse, pressure: float, n: int) -> list[Array]:
+    """Second derivatives of the quadratic form at the points, times the weights, in the order of _PAIRS."""
+    J = np.hypot(space.R_x, space.Z_x)
+    area = space.weights * space.R * J
+    xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
+    work = -pressure * space.weights
+    t, z = r.t_rho, r.t_z
+    A, B, N1, N2 = r.A, r.B, r.N1, r.N2
+    along, out, across = A * t**2 + N2 * z**2, A * z**2 + N2 * t**2, (A - N2) * t * z  # of e, of f, mixed
+    _, m_r, _, m_rr, m_rz, m_zz = r.field
+    volume_c = work * r.eta
+    entries = {
+        (_A, _A): (r.W22 + n**2 * along) * oo + m_rr * area,
+        (_A, _AX): r.W12 * t * xo + volume_c,
+        (_A, _C): n * (r.W22 + along) * oo,
+        (_A, _CX): -n * B * t * xo + n * volume_c,
+        (_A, _B): n**2 * across * oo + m_rz * area + work * r.rho_x,
+        (_A, _BX): r.W12 * z * xo,
+        (_AX, _AX): (r.W11 * t**2 + N1 * z**2) * xx,
+        (_AX, _C): n * r.W12 * t * xo + n * volume_c,
+        (_AX, _B): work * r.rho,
+        (_AX, _BX): (r.W11 - N1) * t * z * xx,
+        (_C, _C): (n**2 * r.W22 + along) * oo + m_r / r.rho * area,
+        (_C, _CX): -B * t * xo + volume_c,
+        (_C, _B): n * across * oo + n * work * r.rho_x,
+        (_C, _BX): n * r.W12 * z * xo,
+        (_CX, _CX): A * xx,
+        (_CX, _B): -n * B * z * xo,
+        (_B, _B): n**2 * out * oo + m_zz * area,
+        (_BX, _BX): (r.W11 * z**2 + N1 * t**2) * xx,
+    }
+    return [entries[pair] for pair in _PAIRS]
+
+
+def azimuthal_eigenvalue(potential: Potential, x: Array, pressure: float, n: int, guess: Array | None = None) -> SmallestEigenvalue:
+    """Smallest eigenvalue against n waves around the axis, proved by inertia to be the smallest.
+
+    ``guess`` is the ``mode`` of a neighbouring state at the same n. See :func:`azimuthal_verdict` for states with a compressive stress,
+    where no eigenvalue has a meaning.
+
+    Raises
+    ------
+    InputError, SpectrumError
+    """
+    return _smallest(azimuthal_operator(potential, x, pressure, n), guess)
+
+
+def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigenvalue:
+    start = _Spectrum(operator, None).first_guess() if guess is None else guess
+    return smallest_eigenvalue(operator.band, operator.mass, operator.half_bandwidth, None, start)
+
+
+class _Spectrum:
+    """The pencil (K, M), with constraint . phi = 0 if given."""
+
+    def __init__(self, operator: AzimuthalOperator, constraint: Array | None) -> None:
+        self.band, self.mass, self.kd, self.constraint = operator.band, operator.mass, operator.half_bandwidth, constraint
+        self.n = int(operator.band.shape[1])
+        self.scale = float(np.abs(self.band[2 * self.kd] / self.mass[2 * self.kd]).max())
+
+    def count(self, shift: float) -> int:
+        """Number of eigenvalues below a shift, by inertia."""
+        return negative_directions(self.band - shift * self.mass, self.kd, self.constraint)
+
+    def lower_bound(self) -> float:
+        """A shift below the spectrum."""
+        shift = 0.0
+        while self.count(shift) > 0:
+            shift = min(4 * shift, -1.0)
+            if shift < -1e3 * self.scale:
+                raise SpectrumError("the second variation has no lower bound within reach")
+        return shift
+
+    def first_guess(self, width: int = 6, iterations: int = 3) -> Array:
+        """Best vector of a block of inverse iterations: the lowest azimuthal eigenvalues are too close together for a single vector."""
+        solver = BandFactor(self.band - self.lower_bound() * self.mass, self.kd)
+        block = np.random.default_rng(0).standard_normal((self.n, min(width, self.n)))
+
+        def times(band: Array) -> Array:
+            return np.stack([band_product(band, self.kd, column) for column in block.T], axis=1)
+
+        for _ in range(iterations):
+            block = np.linalg.qr(solver.solve(times(self.mass)))[0]
+        return np.asarray(block @ eigh(block.T @ times(self.band), block.T @ times(self.mass))[1][:, 0])
+
+    def lanczos(self, count: int, width: int) -> list[tuple[float, Array]]:
+        """Shift-invert Lanczos iterations from a certified lower bound."""
+        shift = self.lower_bound()
+        factor = BandFactor(self.band - shift * self.mass, self.kd)
+        bordered = None if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, 0.0)
+
+        def inverse(right: Array) -> Array:
+            return factor.solve(right.ravel()) if bordered is None else bordered.solve(right.ravel(), 0.0)[0]
+
+        def operator(matvec: Callable[[Array], Array]) -> LinearOperator:
+            return LinearOperator((self.n, self.n), matvec=matvec, dtype=float)
+
+        stiffness, mass = (operator(partial(_flat_product, band, self.kd)) for band in (self.band, self.mass))
+        start = inverse(np.random.default_rng(0).standard_normal(self.n))
+        try:
+            values, modes = eigsh(stiffness, k=count, M=mass, sigma=shift, OPinv=operator(inverse), v0=start, ncv=width, tol=1e-12)
+        except ArpackNoConvergence as error:
+            raise SpectrumError(f"Lanczos iterations did not converge: {error}") from error
+        return [(float(values[k]), self.normalised(modes[:, k])) for k in np.argsort(values)]
+
+    def normalised(self, mode: Array) -> Array:
+        """With mode . M mode = 1, the largest entry positive."""
+        size = np.sqrt(mode @ band_product(self.mass, self.kd, mode))
+        return mode / (size * np.sign(mode[np.argmax(np.abs(mode))]))
+
+
+def _flat_product(band: Array, half_bandwidth: int, x: Array) -> Array:
+    return band_product(band, half_bandwidth, x.ravel())
+
+
+def lowest_eigenvalues(
+    potential: Potential, x: Array, pressure: float, n: int, count: int = 4, control: str = "pressure"
+) -> list[tuple[float, Array]]:
+    """The lowest eigenvalues and modes against n waves around the axis, proved complete by inertia.
+
+    An eigenvalue is a squared natural frequency, omega = sqrt(lambda), in units of sqrt(mu/rho_m)/R0 with rho_m the mass density.
+
+    Parameters
+    ----------
+    potential, x, pressure, n : as in :func:`azimuthal_operator`
+    count : int
+        How many, each counted with its multiplicity.
+    control : {"pressure", "volume"}
+        Makes a difference for n = 0 only: other perturbations leave the volume unchanged to first order.
+
+    Returns
+    -------
+    list of (float, ndarray of shape (n_free,))
+        In increasing order; modes are normalised in M, and :meth:`AzimuthalOperator.shape` gives them at the nodes.
+
+    Raises
+    ------
+    InputError
+    SpectrumError
+        When the eigenvalues found cannot be proved to be the lowest.
+    """
+    if control not in CONTROLS:
+        raise unknown_name("control", control, CONTROLS)
+    operator = azimuthal_operator(potential, x, pressure, n)
+    size = operator.band.shape[1]
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count < size - 1:
+        raise InputError("count", count, f"a whole number from 1 to {size - 2} is allowed")
+    constraint = potential.evaluate(x, pressure).volume_gradient if n == 0 and control == "volume" else None
+    spectrum = _Spectrum(operator, constraint)
+    for width in (max(2 * count + 1, 20), max(4 * count + 1, 60)):
+        found = spectrum.lanczos(int(count), min(width, size))
+        # all that lies clearly below the last one must have been found
+        shift = found[-1][0] - max(1e-6 * abs(found[-1][0]), 1e-12 * spectrum.scale)
+        if spectrum.count(shift) == sum(value < shift for value, _ in found):
+            return found
+    raise SpectrumError(f"the {count} eigenvalues found could not be proved to be the lowest")
+
+
+def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, guess: Array | None = None) -> Verdict:
+    """Verdict against n >= 1 waves around the axis; the same under pressure and volume control.
+
+    Parameters
+    ----------
+    potential, x, pressure, n : as in :func:`azimuthal_operator`
+    guess : ndarray, optional
+        ``coefficients`` of the verdict of a neighbouring state at the same n.
+
+    Raises
+    ------
+    InputError
+        For n that is no whole number >= 1.
+    SpectrumError
+    """
+    _check_waves(n, 1)
+    operator = azimuthal_operator(potential, x, pressure, n)
+    wrinkles = _compression(operator)
+    if wrinkles:
+        return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
+    found = _smallest(operator, guess)
+    stable = None if abs(found.value) <= found.error else found.value > 0
+    among = f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
+    reason = {
+        True: f"stable: energy rises under all {among} (smallest eigenvalue {found.value:.6g})",
+        False: f"unstable: energy falls in {found.negative} direction(s) among {among} (smallest eigenvalue {found.value:.6g})",
+        None: f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}",
+    }[stable]
+    shape = partial(azimuthal_shape, potential.space, operator.n)
+    return Verdict(stable, found.value, found.error, None, operator.n, found.negative, reason, found.mode, shape)
+
+
+def _compression(operator: AzimuthalOperator) -> str:
+    """Where a principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails; empty if nowhere."""
+    r, R = operator.response, operator.space.R
+    limit = -_COMPRESSION * max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
+    found = []
+    for name, stress, lines in (("meridional", r.s1, "circles"), ("hoop", r.s2, "meridians")):
+        bad = R[stress < limit]
+        if bad.size:
+            found.append(f"{name} stress compressive at r in [{bad.min():.3g}, {bad.max():.3g}]: wrinkles along {lines}")
+    return "; ".join(found)

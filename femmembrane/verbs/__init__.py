@@ -1,0 +1,9 @@
+"""What a user asks for: one verb, one frozen result."""
+
+from .follow import equilibrium as equilibrium
+from .follow import inflate as inflate
+from .follow import pressurize as pressurize
+from .follow import run as run
+from .search import Equilibria as Equilibria
+from .search import equilibria as equilibria
+from .trace import trace as trace

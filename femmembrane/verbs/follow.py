@@ -1,0 +1,292 @@
+"""Equilibria and runs under volume, pressure or height control."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError, SolveError, Status, unknown_name
+from ..potential import Array, Potential, potential_of
+from ..results.records import Branch, Equilibrium, Jump, SpecialPoint
+from ..scene import Scene
+from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
+from ..solve.minimize import is_minimum, minimize_and_verify
+from ..solve.newton import correct
+from ..solve.search import Limit, beyond_limit
+from ..solve.start import START_VOLUME, start_at_height, start_at_pressure, start_at_volume
+from ..solve.state import Path, State
+from ..solve.stepping import Corrector, march
+from ..threads import one_thread
+from .recording import OnStep, record, resume
+from .trace import trace
+
+_SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
+_CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl, "height": CenterHeightControl}
+_STARTS: dict[str, Callable[[Potential, float], State]] = {
+    "volume": start_at_volume,
+    "pressure": start_at_pressure,
+    "height": start_at_height,
+}
+#: the controls of a minimiser; a height is held by no potential
+_MINIMISED = ("volume", "pressure")
+AT_LIMIT = ("stop", "jump")
+
+
+@one_thread
+def inflate(
+    scene: Scene,
+    *,
+    volumes: ArrayLike,
+    start: Equilibrium | None = None,
+    solver: str = "ipopt",
+    at_limit: str = "stop",
+    throw: bool = True,
+    on_step: OnStep | None = None,
+) -> Branch:
+    """Follow the membrane through given volumes, in the order given.
+
+    Parameters
+    ----------
+    scene : Scene
+    volumes : array_like
+        Enclosed volumes over R0^3 (with the 2 pi), signed.
+    start : Equilibrium, optional
+        A neighbour to start from; default: inflated without sources, which are then turned on at the first volume.
+    solver : {"ipopt", "newton"}
+        Minimiser, or the bordered corrector (which also follows saddle points).
+    at_limit : {"stop", "jump"}
+        Where the branch turns back before a load: end there, saying where the membrane would jump to, or go to the next stable state
+        that the branch has at that load, and on from it.
+    throw : bool
+        Raise when a volume cannot be reached; otherwise return what was reached, with its status and message.
+    on_step : callable, optional
+        Called with (index, total, equilibrium) after each equilibrium.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter carries the branch up to the failure as ``result``.
+    """
+    return _follow(scene, "volume", _loads("volumes", volumes), start, solver, throw, on_step, at_limit)
+
+
+@one_thread
+def pressurize(
+    scene: Scene,
+    *,
+    pressures: ArrayLike,
+    start: Equilibrium | None = None,
+    solver: str = "ipopt",
+    at_limit: str = "stop",
+    throw: bool = True,
+    on_step: OnStep | None = None,
+) -> Branch:
+    """Follow the membrane through given pressures P = p R0/(mu T), in the order given; otherwise as :func:`inflate`.
+
+    Without ``start`` the first state is the first stable equilibrium met on the branch through the moderately inflated membrane.
+    """
+    return _follow(scene, "pressure", _loads("pressures", pressures), start, solver, throw, on_step, at_limit)
+
+
+@one_thread
+def equilibrium(
+    scene: Scene,
+    *,
+    volume: float | None = None,
+    pressure: float | None = None,
+    center_height: float | None = None,
+    gas: Gas | None = None,
+    start: Equilibrium | None = None,
+    solver: str = "ipopt",
+) -> Equilibrium:
+    """One equilibrium at a volume, a pressure, a height of the pole, or with a fixed amount of gas.
+
+    Exactly one of ``volume``, ``pressure``, ``center_height`` and ``gas`` is given. Under volume and pressure control the state is a
+    minimum (``solver="ipopt"``), or any solution of the equations (``"newton"``). The other two always take the Newton corrector:
+    a height is held by no potential, and with a gas the branch is followed as the gas is let in.
+
+    Raises
+    ------
+    InputError, SolveError
+    """
+    given: dict[str, Any] = {
+        k: v for k, v in (("volume", volume), ("pressure", pressure), ("height", center_height), ("gas", gas)) if v is not None
+    }
+    if len(given) != 1:
+        raise InputError("equilibrium", sorted(given), "exactly one of volume, pressure, center_height and gas is allowed")
+    if gas is not None:
+        return _in_gas(scene, gas, start)
+    ((control, load),) = given.items()
+    if np.ndim(load):
+        raise InputError(control, load, "one number is allowed")
+    value = _loads(control, [load])
+    return _follow(scene, control, value, start, solver, True, None)[0]
+
+
+@one_thread
+def run(scene: Scene, on_step: OnStep | None = None) -> Branch:
+    """Do what the scene's [run] says; never raises for a solve that fails: the branch carries its status and message.
+
+    Raises
+    ------
+    InputError
+        When the scene has no [run].
+    """
+    if scene.run is None:
+        raise InputError("run", None, 'a [run] table is required, for instance control = "volume", start = 0.5, stop = 75.0, steps = 60')
+    asked = scene.run
+    if asked.control == "arc-length":
+        return trace(scene, start=asked.start or 0.0, until=asked.until, max_steps=asked.max_steps, throw=False, on_step=on_step)
+    return _follow(scene, asked.control, asked.loads(), None, asked.solver, False, on_step, asked.at_limit)
+
+
+def _loads(key: str, values: ArrayLike) -> Array:
+    try:
+        loads = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(key, values, "numbers are allowed") from None
+    if loads.ndim != 1 or not loads.size or not np.isfinite(loads).all():
+        raise InputError(key, values, "one or more finite numbers are allowed")
+    return loads
+
+
+def _follow(
+    scene: Scene,
+    control: str,
+    loads: Array,
+    start: Equilibrium | None,
+    solver: str,
+    throw: bool,
+    on_step: OnStep | None,
+    at_limit: str = "stop",
+) -> Branch:
+    if solver not in _SOLVERS:
+        raise unknown_name("solver", solver, _SOLVERS)
+    if at_limit not in AT_LIMIT:
+        raise unknown_name("at_limit", str(at_limit), AT_LIMIT)
+    clock = time.perf_counter()
+    potential = potential_of(scene)
+    timings = {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
+    found: list[Equilibrium] = []
+    jumps: list[Jump] = []
+    walk = _Walk(scene, potential, control, _SOLVERS[solver], start)
+    status, message = Status.CONVERGED, ""
+    for index, load in enumerate(loads):
+        clock = time.perf_counter()
+        try:
+            state, limit = walk.to(float(load), at_limit == "jump")
+        except SolveError as error:
+            status, message = error.status, f"{control} {load:.9g} was not reached: {error}"
+            timings["solve"] += time.perf_counter() - clock
+            break
+        solved = time.perf_counter()
+        new = record(scene, potential, state, found[-1] if found else None, clock)
+        timings["solve"] += solved - clock
+        timings["verdicts"] += time.perf_counter() - solved
+        if limit is not None:
+            jumps.append(Jump(index, limit.point(scene, potential), new))
+        found.append(new)
+        if on_step is not None:
+            on_step(index, len(loads), new)
+    branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps))
+    if throw and message:
+        raise SolveError(f"{message}; {status.advice}", status=status, result=branch)
+    return branch
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """The branch turned back before a load, and where it is met again."""
+
+    limit: Limit
+
+    def point(self, scene: Scene, potential: Potential) -> SpecialPoint | None:
+        fold = self.limit.fold
+        if fold is None:
+            return None
+        eq = record(scene.replace(analysis=type(scene.analysis)()), potential, fold.point.state)
+        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq)
+
+    def __str__(self) -> str:
+        fold, landing = self.limit.fold, self.limit.landing
+        if fold is None:
+            return "the branch could not be followed there, and no fold was found where it would turn back"
+        at = fold.point.state
+        what = fold.kind.replace("_", " ")
+        where = f"there is no equilibrium near; the {what} is P = {at.pressure:.9g}, V = {at.volume:.9g}"
+        if landing is None:
+            return f"{where}, and no stable state was met beyond it"
+        return f"{where}, from which the membrane would jump to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
+
+
+class _Walk:
+    """From load to load under one control, with the memory that predicts the next state."""
+
+    def __init__(self, scene: Scene, potential: Potential, control: str, corrector: Corrector, start: Equilibrium | None) -> None:
+        self.potential, self.control_at, self.cold = potential, _CONTROLS[control], _STARTS[control]
+        self.quantity, self.corrector = control, corrector if control in _MINIMISED else correct
+        self.path = Path()
+        self.state: State | None = None
+        self.load = 0.0
+        if start is not None:
+            self.state = resume(potential, start)
+            self.load = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
+
+    def to(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
+        """The state at a load, and where the branch turned back if it had to be left for it."""
+        turn = None
+        if self.state is None:
+            self.state = self._first(load)
+        elif load != self.load:
+            try:
+                states = march(self.potential, self.state, self.control_at, self.load, load, path=self.path, corrector=self.corrector)
+                states[-1].iterations = sum(s.iterations for s in states)
+                self.state = states[-1]
+            except SolveError as error:
+                turn = self._turn(error, load)
+                if not jump or turn.limit.landing is None:
+                    raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
+                self.state, self.path = turn.limit.landing, Path()
+        self.load = load
+        return self.state, turn
+
+    def _first(self, load: float) -> State:
+        guess = self.cold(self.potential, load)
+        result = self.corrector(self.potential, self.control_at(load), guess.x, guess.pressure)
+        if result.status is not Status.CONVERGED:
+            raise SolveError(f"the state found there has V = {guess.volume:.6g} and P = {guess.pressure:.6g}", status=result.status)
+        return State.of(result, guess.iterations)
+
+    def _turn(self, error: SolveError, load: float) -> _Turn:
+        last = error.result[-1] if error.result else self.state
+        if self.quantity not in _MINIMISED or last is None:
+            return _Turn(Limit(None, None))
+        control = self.control_at(load)
+        return _Turn(beyond_limit(self.potential, last, self.quantity, load, lambda s: is_minimum(self.potential, control, s.evaluation)))
+
+
+def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
+    """Let the gas in: from the start, or the moderately inflated membrane, along the branch to the gas's own pressure at its volume."""
+    clock = time.perf_counter()
+    if not isinstance(gas, Gas):
+        raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
+    potential = potential_of(scene)
+    state = start_at_volume(potential, START_VOLUME) if start is None else resume(potential, start)
+    # the amount that holds the state at hand is known: march from it to the wanted one
+    held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
+    if held <= 0 or state.volume <= -gas.chamber:
+        raise SolveError(
+            "the start does not compress the gas (P + atmosphere <= 0); start at a larger volume", status=Status.NO_EQUILIBRIUM
+        )
+    if held != gas.amount:
+        state = march(potential, state, lambda amount: replace(gas, amount=amount), held, gas.amount)[-1]
+    return record(scene, potential, state, clock=clock, gas=gas)

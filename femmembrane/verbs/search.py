@@ -1,0 +1,94 @@
+"""All equilibria at one load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from ..potential import potential_of
+from ..results.records import Equilibrium
+from ..scene import Scene
+from ..solve.search import STARTS, Search
+from ..threads import one_thread
+from .recording import record
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibria(Sequence[Equilibrium]):
+    """Equilibria at one load, by increasing energy (E under volume control, E - P V under pressure control).
+
+    Attributes
+    ----------
+    control : {"volume", "pressure"}
+    load : float
+    found : tuple of Equilibrium
+    energies : tuple of float
+        The energy that orders them.
+    searched : str
+        What was done to find them: a search never proves that there are no more.
+    """
+
+    control: str
+    load: float
+    found: tuple[Equilibrium, ...] = field(repr=False)
+    energies: tuple[float, ...]
+    searched: str
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]  # the overloads of Sequence
+        return self.found[index]
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return iter(self.found)
+
+    def __str__(self) -> str:
+        lines = [f"{len(self)} equilibria at {self.control} {self.load:.9g}; {self.searched}"]
+        lines.append(f"{'energy':>14} {'volume':>12} {'pressure':>12} {'pole height':>12}  {'under pressure':<14}  {'under volume':<14}")
+        for energy, eq in zip(self.energies, self.found, strict=True):
+            words = f"{eq.verdict('pressure').word:<14}  {eq.verdict('volume').word:<14}"
+            lines.append(f"{energy:>14.8g} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}  {words}".rstrip())
+        return "\n".join(lines)
+
+
+@one_thread
+def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | None = None, max_steps: int = 400) -> Equilibria:
+    """All equilibria at a pressure or at a volume that can be found, stable or not.
+
+    Branches through several inflated and deflated starts are traced both ways and cut at the load; Newton's method with the states found
+    deflated then looks for branches that are not connected to them.
+
+    Parameters
+    ----------
+    scene : Scene
+    pressure, volume : float
+        Exactly one of them.
+    max_steps : int
+        Most steps in each direction along a branch.
+
+    Raises
+    ------
+    InputError
+    """
+    given = {k: v for k, v in (("pressure", pressure), ("volume", volume)) if v is not None}
+    if len(given) != 1:
+        raise InputError("equilibria", sorted(given), "exactly one of pressure and volume is allowed")
+    ((control, load),) = given.items()
+    if isinstance(load, bool) or not isinstance(load, (int, float, np.number)) or not np.isfinite(load):
+        raise InputError(control, load, "a finite number is allowed")
+    potential = potential_of(scene)
+    search = Search(potential, control, float(load), max_steps)
+    search.run()
+    found = [record(scene, potential, state) for state in search.states]
+    energies = [eq.energy - eq.pressure * eq.volume * (control == "pressure") for eq in found]
+    order = np.argsort(energies, kind="stable")
+    spans = ", ".join(f"V = {low:.4g} to {high:.4g}" for low, high in search.traced)
+    searched = (
+        f"searched: {len(search.traced)} traced stretch(es) ({spans}), starts at V = {', '.join(f'{v:g}' for v in STARTS)}, "
+        f"{search.deflations} deflated solves ({search.iterations} iterations)"
+    )
+    return Equilibria(control, float(load), tuple(found[k] for k in order), tuple(float(energies[k]) for k in order), searched)

@@ -1,0 +1,235 @@
+"""Whole branches by arc length, with their special points."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError, SolveError, Status, unknown_name
+from ..potential import Potential, potential_of
+from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
+from ..scene import QUANTITIES, Scene
+from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
+from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
+from ..solve.start import start_at_volume
+from ..solve.state import Path
+from ..stability.verdict import compressed
+from ..threads import one_thread
+from .recording import OnStep, record, resume
+
+#: distance to a source at which the membrane counts as touching it
+CONTACT = 1e-3
+
+
+@one_thread
+def trace(
+    scene: Scene,
+    *,
+    start: float | Equilibrium | Branch = 0.5,
+    until: Mapping[str, float] | None = None,
+    direction: int = 1,
+    max_steps: int = 400,
+    steps: StepControl | None = None,
+    special_points: bool = True,
+    ill_posed: str = "stop",
+    throw: bool = True,
+    on_step: OnStep | None = None,
+) -> Branch:
+    """Follow a branch by arc length, stable or not, through limit points and folds.
+
+    Parameters
+    ----------
+    scene : Scene
+    start : float, Equilibrium or Branch
+        A volume, an equilibrium of this scene, or a traced branch to be continued (its points are part of the result, and the new
+        ones are those of an uninterrupted trace to the last bit).
+    until : mapping, optional
+        Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it.
+    direction : {1, -1}
+        1 sets out towards larger volume.
+    max_steps : int
+    steps : StepControl, optional
+        Lengths and accuracy of the steps.
+    special_points : bool
+        Locate limit points, volume folds, height folds and branch points.
+    ill_posed : {"stop", "mark"}
+        What to do where the meridional stress is compressive, so that the Legendre-Hadamard condition fails and the plain membrane
+        has no mesh-independent equilibria: end there, or go on with that status on every such state.
+    throw : bool
+        Raise when the branch ends before ``until`` is met; otherwise return it with its status and message.
+    on_step : callable, optional
+        Called with (index, total, equilibrium) after each step.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter carries the branch up to the failure as ``result``.
+    """
+    targets = _targets(until)
+    if direction not in (1, -1):
+        raise InputError("direction", direction, "1 (towards larger volume) or -1 is allowed")
+    if ill_posed not in ("stop", "mark"):
+        raise unknown_name("ill_posed", str(ill_posed), ("stop", "mark"))
+    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
+        raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
+    tracing = _Tracing.begin(scene, start, direction, steps or StepControl(), special_points, on_step, int(max_steps))
+    status, message = tracing.follow(targets, ill_posed)
+    branch = tracing.branch(status, message)
+    if throw and message and (until is not None or status is not Status.STEP_LIMIT):
+        raise SolveError(message, status=status, result=branch)
+    return branch
+
+
+def _targets(until: Mapping[str, float] | None) -> dict[str, float]:
+    targets = dict(until or {})
+    for quantity, value in targets.items():
+        if quantity not in QUANTITIES:
+            raise unknown_name("until", quantity, QUANTITIES)
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
+            raise InputError(f"until.{quantity}", value, "a finite number is allowed")
+    return {quantity: float(value) for quantity, value in targets.items()}
+
+
+@dataclass
+class _Tracing:
+    """A trace under way."""
+
+    scene: Scene
+    potential: Potential
+    point: BranchPoint
+    tracer: Tracer
+    found: list[Equilibrium]
+    special: list[SpecialPoint] | None
+    on_step: OnStep | None
+    max_steps: int
+    regular: int = 0
+    unexplained: list[str] = field(default_factory=list)
+    timings: dict[str, float] = field(default_factory=lambda: {"setup": 0.0, "solve": 0.0, "special_points": 0.0, "verdicts": 0.0})
+
+    @classmethod
+    def begin(
+        cls,
+        scene: Scene,
+        start: float | Equilibrium | Branch,
+        direction: int,
+        steps: StepControl,
+        special_points: bool,
+        on_step: OnStep | None,
+        max_steps: int,
+    ) -> _Tracing:
+        clock = time.perf_counter()
+        potential = potential_of(scene)
+        tracer = Tracer(Path(), steps.first, steps)
+        special: list[SpecialPoint] | None = [] if special_points else None
+        if isinstance(start, Branch):
+            return cls._continued(scene, potential, start, tracer, on_step, max_steps)
+        if isinstance(start, Equilibrium):
+            state = resume(potential, start)
+        elif isinstance(start, (int, float, np.number)) and not isinstance(start, bool) and np.isfinite(start):
+            state = start_at_volume(potential, float(start))
+        else:
+            raise InputError("start", start, "a volume, an Equilibrium or a traced Branch is allowed")
+        tracing = cls(scene, potential, first_point(potential, state, direction), tracer, [], special, on_step, max_steps)
+        tracing.timings["setup"] = time.perf_counter() - clock
+        tracing.add(tracing.point, clock)
+        tracing.regular = 1
+        return tracing
+
+    @classmethod
+    def _continued(
+        cls, scene: Scene, potential: Potential, start: Branch, tracer: Tracer, on_step: OnStep | None, max_steps: int
+    ) -> _Tracing:
+        memory = start.memory
+        if memory is None:
+            raise InputError(
+                "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
+            )
+        for sigma, z, slope in zip(memory.sigma, memory.points, memory.slopes, strict=True):
+            tracer.path.append(sigma, z[:-1], float(z[-1]), slope[:-1], float(slope[-1]))
+        tracer.step = memory.step
+        state = resume(potential, start[memory.regular - 1])
+        point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1][:-1], float(memory.slopes[-1][-1]))
+        special = None if start.special_points is None else list(start.special_points)
+        return cls(scene, potential, point, tracer, list(start[: memory.regular]), special, on_step, max_steps, memory.regular)
+
+    def follow(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str]:
+        """Step until a target is met or the branch ends; the status, and a message unless a target was met."""
+        points = trace_points(self.potential, self.point, self.tracer)
+        for _ in range(self.max_steps):
+            clock = time.perf_counter()
+            try:
+                new = next(points)
+            except SolveError as error:
+                return self._ended(error)
+            self.timings["solve"] += time.perf_counter() - clock
+            segment = Segment(self.potential, self.point, new)
+            met = [segment.crossing(q, v) for q, v in targets.items() if segment.crosses(q, v)]
+            last = min(met, key=lambda p: p.sigma) if met else None
+            if self.special is not None:
+                self._look_for_special_points(segment, last)
+            self.add(last or new, clock)
+            if last is not None:
+                return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
+            self.point, self.regular = new, len(self.found)
+            where = compressed(self.potential, new.state.evaluation)
+            if where is not None and ill_posed == "stop":
+                return Status.LEGENDRE_FAILURE, (
+                    f"at pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g}) the "
+                    f"meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}]: the Legendre-Hadamard condition fails "
+                    "there, and what a mesh finds beyond depends on the mesh"
+                )
+            if self._contact(new):
+                return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
+        if self.unexplained:
+            return Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained)
+        return Status.STEP_LIMIT, f"{self.max_steps} steps were made without meeting {dict(targets) or 'an end'}"
+
+    def add(self, point: BranchPoint, clock: float) -> None:
+        solved = time.perf_counter()
+        new = record(self.scene, self.potential, point.state, self.found[-1] if self.found else None, clock)
+        self.timings["verdicts"] += time.perf_counter() - solved
+        self.found.append(new)
+        if self.on_step is not None:
+            self.on_step(len(self.found) - 1, self.max_steps + 1, new)
+
+    def _look_for_special_points(self, segment: Segment, last: BranchPoint | None) -> None:
+        clock = time.perf_counter()
+        located = [fold for kind in FOLDS for fold in segment.folds(kind)]
+        turns = sum(fold.kind == "limit_point" for fold in located)
+        if (parity(segment.a) * parity(segment.b) < 0) != (turns % 2 == 1):
+            found = branch_point(segment)
+            if found is None:
+                a, b = segment.a.state, segment.b.state
+                self.unexplained.append(f"the inertia changes between V = {a.volume:.6g} and {b.volume:.6g} without a located point")
+            else:
+                located.append(found)
+        for fold in sorted(located, key=lambda f: f.point.sigma):
+            if last is None or fold.point.sigma <= last.sigma:
+                self.special.append(self._special(fold))  # type: ignore[union-attr]
+        self.timings["special_points"] += time.perf_counter() - clock
+
+    def _special(self, fold: Located) -> SpecialPoint:
+        eq = record(self.scene, self.potential, fold.point.state)
+        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq)
+
+    def _contact(self, point: BranchPoint) -> bool:
+        return self.potential.distance_to_sources(point.state.x) < CONTACT
+
+    def _ended(self, error: SolveError) -> tuple[Status, str]:
+        near = self.potential.distance_to_sources(self.point.state.x)
+        if near < 50 * CONTACT:
+            return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
+        return error.status, str(error)
+
+    def branch(self, status: Status, message: str) -> Branch:
+        path = self.tracer.path
+        memory = TraceMemory(tuple(path.sigma), np.array(path.point), np.array(path.slope), self.tracer.step, self.regular)
+        special = None if self.special is None else tuple(self.special)
+        return Branch(self.scene, tuple(self.found), status, message, self.timings, special, memory)

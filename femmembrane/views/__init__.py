@@ -1,0 +1,1 @@
+"""Pictures of what was computed: files for ParaView, rendered surfaces and plots."""

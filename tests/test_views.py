@@ -1,0 +1,286 @@
+"""Files for ParaView and pictures: they open elsewhere, hold the numbers of the profile, and show something."""
+
+from __future__ import annotations
+
+import dataclasses
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femmembrane.discretization.meridian import disc
+from femmembrane.errors import InputError
+from femmembrane.physics.magnetics import Dipole
+from femmembrane.physics.materials import NeoHookean
+from femmembrane.results.records import Branch, SpecialPoint
+from femmembrane.scene import Analysis, Scene
+from femmembrane.stability.verdict import Verdict
+from femmembrane.verbs import inflate
+from femmembrane.views import plots, vtk
+
+pyvista = pytest.importorskip("pyvista")
+
+ELEMENTS, VOLUMES = 12, [0.5, 1.5, 4.0, 8.0]
+SCENE = Scene(
+    NeoHookean(),
+    mesh=disc(ELEMENTS),
+    sources=[Dipole(strength=50, height=5.0)],
+    susceptibility=2.5,
+    title="A title, 5 $ a piece",
+    analysis=Analysis(("pressure", "volume")),
+)
+
+
+@pytest.fixture(scope="module")
+def branch() -> Branch:
+    return inflate(SCENE, volumes=VOLUMES)
+
+
+@pytest.fixture(scope="module")
+def folder(branch: Branch, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("vtk") / "some name.pvd"
+    assert vtk.write_vtk(branch, path)[-1] == path
+    return path.parent
+
+
+@pytest.fixture(scope="module")
+def grids(folder: Path) -> list[pyvista.UnstructuredGrid]:
+    return [pyvista.read(path) for path in sorted((folder / "some name").glob("*.vtu"))]
+
+
+def surface_volume(grid: pyvista.UnstructuredGrid) -> float:
+    """Int z n_z dA over the surface: the volume above the plane of the rim (divergence theorem; the rim's disc adds nothing)."""
+    cells = grid.cells_dict
+    quads = cells[pyvista.CellType.QUAD]
+    triangles = np.concatenate([cells[pyvista.CellType.TRIANGLE], quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    a, b, c = (np.asarray(grid.points, dtype=float)[triangles[:, k]] for k in range(3))
+    return float((np.cross(b - a, c - a)[:, 2] / 2 * (a + b + c)[:, 2] / 3).sum())
+
+
+# --- VTU and PVD
+
+
+def test_collection(branch: Branch, folder: Path, grids: list[pyvista.UnstructuredGrid]) -> None:
+    reader = pyvista.get_reader(folder / "some name.pvd")
+    assert reader.time_values == list(range(len(branch)))
+    assert len(grids) == len(branch)
+    files = [entry.get("file", "") for entry in ET.parse(folder / "some name.pvd").iter("DataSet")]
+    assert all((folder / file).is_file() and not Path(file).is_absolute() for file in files)
+
+
+def test_cells(grids: list[pyvista.UnstructuredGrid]) -> None:
+    nodes = 2 * ELEMENTS + 1
+    for grid in grids:
+        assert grid.n_points == 1 + (nodes - 1) * vtk.SECTORS  # one point at the pole
+        counts = {kind: len(cells) for kind, cells in grid.cells_dict.items()}
+        assert counts == {
+            pyvista.CellType.TRIANGLE: vtk.SECTORS,
+            pyvista.CellType.QUAD: (nodes - 2) * vtk.SECTORS,
+            pyvista.CellType.LINE: nodes - 1,
+        }
+
+
+def test_fields_are_those_of_the_profile(branch: Branch, grids: list[pyvista.UnstructuredGrid]) -> None:
+    for equilibrium, grid in zip(branch, grids, strict=True):
+        profile = equilibrium.profile()
+        line = grid.cells_dict[pyvista.CellType.LINE]
+        meridian = np.append(line[:, 0], line[-1, 1])
+        expected = np.stack([profile["rho"], 0 * profile["rho"], profile["eta"]], axis=1)
+        np.testing.assert_allclose(grid.points[meridian], expected, atol=1e-14)
+        for name in vtk.FIELDS:
+            values = grid.point_data[name]
+            assert np.isfinite(values).all()
+            np.testing.assert_array_equal(values[meridian], profile[name])
+        assert set(grid.cell_data["pressure"]) == {equilibrium.pressure}
+        assert set(grid.cell_data["volume"]) == {equilibrium.volume}
+
+
+def test_displacement_leads_back_to_the_disc(grids: list[pyvista.UnstructuredGrid]) -> None:
+    for grid in grids:
+        reference = grid.points - grid.point_data["displacement"]
+        np.testing.assert_allclose(reference[:, 2], 0, atol=1e-14)
+        radii = np.unique(np.hypot(reference[:, 0], reference[:, 1]).round(12))
+        np.testing.assert_allclose(radii, np.linspace(0, 1, 2 * ELEMENTS + 1), atol=1e-11)
+
+
+def test_rim_is_clamped(grids: list[pyvista.UnstructuredGrid]) -> None:
+    for grid in grids:
+        rim = grid.points[-vtk.SECTORS :]
+        np.testing.assert_allclose(np.hypot(rim[:, 0], rim[:, 1]), 1, atol=1e-14)
+        np.testing.assert_allclose(rim[:, 2], 0, atol=1e-14)
+        assert np.abs(grid.point_data["displacement"][-vtk.SECTORS :]).max() <= 1e-14
+
+
+def test_enclosed_volume(branch: Branch, grids: list[pyvista.UnstructuredGrid]) -> None:
+    """A polygon of n sides in place of each circle loses sin(x)/x, x = 2 pi/n, of the volume; the broken meridian a little more."""
+    x = 2 * np.pi / vtk.SECTORS
+    for equilibrium, grid in zip(branch, grids, strict=True):
+        assert surface_volume(grid) == pytest.approx(np.sin(x) / x * equilibrium.volume, rel=5e-3)
+
+
+def test_fewer_steps_leave_no_old_surfaces(branch: Branch, tmp_path: Path) -> None:
+    vtk.write_vtk(branch, tmp_path / "m.pvd")
+    (tmp_path / "m" / "m_mine.vtu").write_text("not ours")
+    vtk.write_vtk(branch[:2], tmp_path / "m.pvd")
+    assert sorted(p.name for p in (tmp_path / "m").iterdir()) == ["m_0000.vtu", "m_0001.vtu", "m_mine.vtu"]
+
+
+def test_annulus_and_sphere() -> None:
+    """Every end of a meridian, on the axis or not, closes as it should."""
+    for r, triangles, points in (([0.5, 1.0], 0, 8), ([0.0, 1.0], 4, 5), ([0.0, 1.0, 0.0], 8, 6)):
+        revolution = vtk.Revolution.of(np.array(r), sectors=4)
+        assert len(revolution.triangles) == triangles
+        assert revolution.node.size == points
+        cells = [*revolution.triangles.tolist(), *revolution.quads.tolist(), *revolution.line.tolist()]
+        assert all(len(set(cell)) == len(cell) for cell in cells)
+
+
+def test_undefined_on_the_axis(branch: Branch) -> None:
+    """A quantity that is 0/0 on the axis takes its neighbour's value."""
+
+    class Undefined:
+        def profile(self) -> dict[str, np.ndarray]:
+            return {"r": np.array([0.0, 1.0]), "stretch_2": np.array([np.nan, 1.5])}
+
+    assert vtk.smooth_profile(Undefined())["stretch_2"].tolist() == [1.5, 1.5]  # type: ignore[arg-type]
+
+
+def test_names_that_are_refused(branch: Branch, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.pvd"):
+        branch.to_vtk(tmp_path / "membrane.vtu")
+    with pytest.raises(InputError, match="writable"):
+        branch.to_vtk(tmp_path / "nowhere" / "membrane.pvd")
+
+
+# --- rendered pictures
+
+
+def test_render(branch: Branch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    from matplotlib.image import imread
+
+    vtk.render(branch, tmp_path / "membrane.png", size=(400, 300))
+    image = imread(tmp_path / "membrane.png")[..., :3]
+    assert image.shape == (300, 400, 3)
+    assert image.std() > 0.05
+    assert 0.1 < (image.min(axis=2) < 0.9).mean() < 0.9  # neither blank nor cut off
+    border = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+    assert (border == 1).all()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_render_refuses(branch: Branch, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="stretch_1"):
+        vtk.render(branch[0], tmp_path / "membrane.png", quantity="strech_1")
+    with pytest.raises(InputError, match="one or more equilibria"):
+        vtk.render(branch[:0], tmp_path / "membrane.png")
+
+
+# --- plots
+
+
+def styles(figure: object) -> dict[str, str]:
+    (axes,) = figure.axes  # type: ignore[attr-defined]
+    return {line.get_label(): line.get_linestyle() for line in axes.lines if not line.get_label().startswith("_")}
+
+
+def test_pressure_volume(branch: Branch, tmp_path: Path) -> None:
+    from matplotlib.image import imread
+
+    figure = plots.plot_pressure_volume(branch, tmp_path / "pv.png")
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "volume V/R₀³"
+    assert axes.get_ylabel() == "pressure P = pR₀/(μT)"
+    assert imread(tmp_path / "pv.png")[..., :3].std() > 0.05
+    # the limit point of the neo-Hookean disc is at V = 2.797 (reference/disc.json); the dipole moves it little
+    assert styles(figure) == {"stable under both controls": "-", "stable under volume control only": "--"}
+    assert axes.get_legend() is not None
+
+
+def test_lines_meet(branch: Branch) -> None:
+    """No gap where the style changes, and the change is at the special point between the two equilibria."""
+    special = SpecialPoint("limit_point", 2.8, 1.9, 1.2, 1e-9, branch[1])
+    for points, place in ((None, None), ((special,), (2.8, 1.9))):
+        figure = plots.plot_pressure_volume(dataclasses.replace(branch, special_points=points))
+        lines = [line.get_xydata() for line in figure.axes[0].lines if line.get_label().startswith("stable")]
+        assert len(lines) == 2
+        np.testing.assert_array_equal(lines[0][-1], lines[1][0])
+        expected = place or [(branch[1].volume + branch[2].volume) / 2, (branch[1].pressure + branch[2].pressure) / 2]
+        np.testing.assert_allclose(lines[0][-1], expected)
+
+
+def test_no_claim_without_verdicts(branch: Branch) -> None:
+    scene = SCENE.replace(analysis=Analysis())
+    plain = dataclasses.replace(branch, scene=scene, equilibria=tuple(dataclasses.replace(e, scene=scene) for e in branch))
+    figure = plots.plot_pressure_volume(plain)
+    assert styles(figure) == {}
+    assert figure.axes[0].get_legend() is None
+    assert np.array_equal(figure.axes[0].lines[0].get_xydata(), [[e.volume, e.pressure] for e in branch])
+
+
+@pytest.mark.parametrize("control", ["pressure", "volume"])
+def test_one_control(branch: Branch, control: str) -> None:
+    scene = SCENE.replace(analysis=Analysis((control,)))
+    one = dataclasses.replace(branch, scene=scene, equilibria=tuple(dataclasses.replace(e, scene=scene) for e in branch))
+    expected = {f"stable under {control} control": "-"} | ({"unstable under pressure control": ":"} if control == "pressure" else {})
+    assert styles(plots.plot_pressure_volume(one)).keys() == expected.keys()
+
+
+def test_azimuthal_instability_is_a_band(branch: Branch) -> None:
+    """Behind the line, from half-way before the first equilibrium that is unstable to the mode."""
+    scene = SCENE.replace(analysis=Analysis(azimuthal_modes=(1,)))
+    equilibria = []
+    for k, equilibrium in enumerate(branch):
+        verdict = Verdict(k < 2, 1.5 - k, 1e-9, None, 1, 0, "")
+        equilibria.append(dataclasses.replace(equilibrium, scene=scene, _verdicts={(None, 1): verdict}))
+    figure = plots.plot_pressure_volume(dataclasses.replace(branch, scene=scene, equilibria=tuple(equilibria)))
+    (band,) = (line for line in figure.axes[0].lines if line.get_label() == "unstable to azimuthal n = 1")
+    assert band.get_xydata()[:, 0].tolist() == [(branch[1].volume + branch[2].volume) / 2, branch[2].volume, branch[3].volume]
+
+
+def test_special_points_have_distinct_markers(branch: Branch) -> None:
+    kinds = [*plots.MARKERS, "something_new"]
+    points = tuple(SpecialPoint(kind, 1.0 + k, 1.0, 1.0, 0.0, branch[0]) for k, kind in enumerate(kinds))
+    figure = plots.plot_pressure_volume(dataclasses.replace(branch, special_points=points))
+    named = [line for line in figure.axes[0].lines if not line.get_label().startswith("_")]
+    markers = [line.get_marker() for line in named if line.get_linestyle() == "None"]
+    assert len(set(markers)) == len(kinds)
+
+
+def test_one_equilibrium(branch: Branch, tmp_path: Path) -> None:
+    branch[:1].plot(tmp_path / "pv.png")
+    assert (tmp_path / "pv.png").stat().st_size > 0
+
+
+def test_profiles(branch: Branch, tmp_path: Path) -> None:
+    figure = plots.plot_profiles(branch, tmp_path / "profiles.png", count=3)
+    (axes,) = figure.axes
+    curves = [line for line in axes.lines if line.get_label().startswith("V = ")]
+    assert len(curves) == 3
+    profile = branch[-1].profile(np.linspace(0, 1, 201))
+    x, y = curves[-1].get_xydata().T
+    np.testing.assert_array_equal(np.sort(x[x.size // 2 :]), np.sort(profile["rho"]))
+    np.testing.assert_array_equal(y[y.size // 2 :], profile["eta"])
+    assert any("dipole at height 5" in text.get_text() for text in axes.get_legend().get_texts())
+    assert axes.get_ylim()[1] > 5
+
+
+def test_plots_refuse(branch: Branch) -> None:
+    for plot in (plots.plot_pressure_volume, plots.plot_profiles):
+        with pytest.raises(InputError, match="one or more equilibria"):
+            plot(branch[:0])
+    with pytest.raises(InputError, match="count"):
+        plots.plot_profiles(branch, count=0)
+
+
+def test_no_global_state(branch: Branch) -> None:
+    """Plots leave Matplotlib's settings and windows alone."""
+    import subprocess
+    import sys
+
+    heavy = "{'matplotlib', 'pyvista', 'meshio', 'xarray', 'pandas'}"
+    code = f"import sys, femmembrane.views.plots, femmembrane.views.vtk; print(sorted({heavy} & set(sys.modules)))"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "[]"
+    plots.plot_pressure_volume(branch)
+    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()

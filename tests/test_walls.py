@@ -1,0 +1,114 @@
+"""The walls of the house: who may import whom, read off the source."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import femmembrane
+
+PACKAGE = Path(femmembrane.__file__).parent
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+#: each room may import those before it; what is left of the dot names a folder or a module
+ROOMS = (
+    ("errors", "threads"),
+    ("physics",),
+    ("discretization",),
+    ("scene",),
+    ("potential",),
+    ("solve",),
+    ("stability",),
+    ("accuracy",),
+    ("results", "views"),
+    ("verbs",),
+    ("cli", "__main__"),
+)
+LEVEL = {name: level for level, room in enumerate(ROOMS) for name in room}
+
+#: only there, at any depth of the code
+KEPT_IN = {
+    "casadi": ("potential.py", "solve/minimize.py"),
+    "skfem": ("discretization/",),
+}
+#: only inside functions
+HEAVY = ("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "vtk", "vtkmodules", "h5netcdf", "netCDF4", "rich", "tomli_w")
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
+
+
+def imports(path: Path) -> list[tuple[str, bool]]:
+    """(absolute name, at module level) of every import that runs; what only type checkers see is left out."""
+    found: list[tuple[str, bool]] = []
+    parts = ("femmembrane", *path.relative_to(PACKAGE).with_suffix("").parts)
+
+    def visit(node: ast.AST, outside: bool) -> None:
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            for child in node.orelse:
+                visit(child, outside)
+            return
+        if isinstance(node, ast.Import):
+            found.extend((alias.name, outside) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = ".".join(parts[: len(parts) - node.level]) if node.level else ""
+            stem = ".".join(filter(None, (base, node.module)))
+            # "from . import x" and "from .room import module" name modules by their last part
+            found.extend((f"{stem}.{alias.name}", outside) for alias in node.names)
+        inside = isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+        for child in ast.iter_child_nodes(node):
+            visit(child, outside and not inside)
+
+    visit(ast.parse(path.read_text(encoding="utf-8")), True)
+    return found
+
+
+def test_there_is_something_to_walk():
+    assert {"potential.py", "scene.py", "solve/minimize.py", "discretization/space.py"} <= {name_of(f) for f in FILES}
+    assert ("casadi", True) in imports(PACKAGE / "potential.py")
+    assert any(name.startswith("femmembrane.errors") for name, _ in imports(PACKAGE / "physics" / "materials.py"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_libraries_stay_in_their_room(path):
+    for name, _ in imports(path):
+        library = name.split(".")[0]
+        if library in KEPT_IN:
+            assert name_of(path).startswith(KEPT_IN[library]), f"{name_of(path)} imports {library}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_heavy_libraries_are_imported_inside_functions(path):
+    assert [name for name, outside in imports(path) if outside and name.split(".")[0] in HEAVY] == []
+
+
+@pytest.mark.parametrize("path", [f for f in FILES if f != PACKAGE / "__init__.py"], ids=name_of)
+def test_arrows_point_one_way(path):
+    """Module-level imports never point from an earlier room to a later one."""
+    room = path.relative_to(PACKAGE).with_suffix("").parts[0]
+    assert room in LEVEL, f"{room} has no place in the house: add it to ROOMS"
+    for name, outside in imports(path):
+        parts = name.split(".")
+        if parts[0] != "femmembrane" or not outside or len(parts) < 2 or parts[1] not in LEVEL:
+            continue
+        assert LEVEL[parts[1]] <= LEVEL[room], f"{name_of(path)} imports {name}"
+
+
+def test_public_names_are_imported_when_used():
+    """The front door imports nothing of its own (``--help`` need not wait for the numerics)."""
+    assert [name for name, outside in imports(PACKAGE / "__init__.py") if outside and name.startswith("femmembrane.")] == []
+    assert set(femmembrane.__all__) <= set(dir(femmembrane))
+    for name in femmembrane.__all__:
+        assert getattr(femmembrane, name) is not None
+
+
+@pytest.mark.parametrize("path", FILES, ids=name_of)
+def test_library_code_neither_prints_nor_asserts(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert not [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Assert)]
+    if path.name not in ("cli.py", "__main__.py"):
+        calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        assert not [c for c in calls if ast.unparse(c) in ("print", "sys.exit", "exit", "quit")]

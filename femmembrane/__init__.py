@@ -28,14 +28,22 @@ if TYPE_CHECKING:
     from .scene import Scene as Scene
     from .solve.continuation import StepControl as StepControl
     from .solve.controls import Gas as Gas
+    from .stability.frequencies import Vibration as Vibration
+    from .stability.jacobi import jacobi_test as jacobi_test
+    from .stability.jacobi import legendre_test as legendre_test
     from .stability.verdict import Verdict as Verdict
     from .verbs import Equilibria as Equilibria
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
+    from .verbs import fold_curve as fold_curve
     from .verbs import inflate as inflate
     from .verbs import pressurize as pressurize
     from .verbs import run as run
     from .verbs import trace as trace
+    from .verbs.folds import Cusp as Cusp
+    from .verbs.folds import FoldCurve as FoldCurve
+    from .views.modes import render_mode as render_mode
+    from .views.modes import write_mode_vtk as write_mode_vtk
 
 __version__ = "0.1.0"
 
@@ -49,8 +57,12 @@ _ROOMS = {
     "solve.continuation": ("StepControl",),
     "solve.controls": ("Gas",),
     "scene": ("Analysis", "Run", "Scene"),
+    "stability.frequencies": ("Vibration",),
+    "stability.jacobi": ("jacobi_test", "legendre_test"),
     "stability.verdict": ("Verdict",),
-    "verbs": ("Equilibria", "equilibria", "equilibrium", "inflate", "pressurize", "run", "trace"),
+    "verbs.folds": ("Cusp", "FoldCurve"),
+    "verbs": ("Equilibria", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace"),
+    "views.modes": ("render_mode", "write_mode_vtk"),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -37,7 +37,7 @@ _ADVICE = {
     Status.STEP_UNDERFLOW: "the branch turns or ends here; follow it by arc length (fm.trace) to see which",
     Status.NO_EQUILIBRIUM: "no equilibrium was found near this load; the branch turned back before reaching it",
     Status.DIPOLE_CONTACT: "the membrane runs into a source, where the energy has no lower bound; lower the strength or the load",
-    Status.NOT_A_MINIMUM: "the state balances forces but is no minimum under this control; a minimiser cannot hold it",
+    Status.NOT_A_MINIMUM: 'forces balance there, but a minimiser cannot hold it; solver="newton" accepts such states',
     Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",
     Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",
     Status.INTERRUPTED: "what was computed is kept; continue from there",

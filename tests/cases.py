@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -87,7 +87,7 @@ class Problem:
         return _solve(self, solver)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _solve(problem: Problem, solver: str) -> fm.Equilibrium:
     # a pressure has several minima: the start, at nearly the volume of the tabulated one, says which is meant
     start = _neighbour(problem.point, solver)
@@ -95,7 +95,7 @@ def _solve(problem: Problem, solver: str) -> fm.Equilibrium:
     return fm.equilibrium(problem.point.scene, **{problem.control: load}, start=start, solver=solver)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _neighbour(point: Point, solver: str) -> fm.Equilibrium:
     return fm.equilibrium(point.scene, volume=0.98 * point.expected["volume"], solver=solver)
 

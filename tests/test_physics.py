@@ -52,7 +52,7 @@ def test_rest(material):
 
 @pytest.mark.parametrize("material", MATERIALS)
 def test_shear_modulus_is_one(material):
-    """W = e1^2 + e1 e2 + e2^2 times 2 mu... to second order: uniaxial, equibiaxial and pure shear give 2, 6 and 2 times e^2/2 times 2."""
+    """W = 2 (e1^2 + e1 e2 + e2^2) to second order: 2 e^2 with one strain or two opposite ones, 6 e^2 with two equal ones."""
     h = 1e-5
     assert material.energy(h, 0.0) == pytest.approx(2 * h**2, rel=1e-4)
     assert material.energy(h, h) == pytest.approx(6 * h**2, rel=1e-4)
@@ -177,7 +177,7 @@ def test_fields_superpose():
 
 
 def test_total_stress_by_hand():
-    """h along the tangent: (chi + 1/2) h^2 and -h^2/2; along the normal: -(chi + 1/2) h^2 twice; less the pressure through the thickness."""
+    """h along the tangent: (chi + 1/2) h^2 and -h^2/2; along the normal: -(chi + 1/2) h^2 twice; less P T/R0."""
     tangent = (0.6, 0.8)
     along, across = (0.6 * 2, 0.8 * 2), (-0.8 * 2, 0.6 * 2)
     assert total_stress((1.0, 2.0), 3.0, 1000.0, along, tangent, 2.5) == pytest.approx((1 - 0.003 + 3 * 4, 2 - 0.003 - 2))

@@ -23,6 +23,9 @@ from .meridian import Array, Meridian
 #: pairs (i, j) of the local variables (u, u_x, w, w_x) in the order of Hessian entries
 HESSIAN_PAIRS: tuple[tuple[int, int], ...] = tuple(combinations_with_replacement(range(4), 2))
 
+#: highest degree at which slopes are recovered from the Gauss points
+_RECOVERED = 3
+
 
 class Space:
     """Displacements (u, w) of one degree on one meridian.
@@ -38,16 +41,17 @@ class Space:
 
     def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None) -> None:
         self.mesh, self.degree = mesh, degree
-        line = skfem.MeshLine(mesh.breakpoints())
+        self.ends: Array = mesh.breakpoints()
+        self.sizes: Array = np.diff(self.ends)
+        line = skfem.MeshLine(self.ends)
         element = _line_element(degree)
         local, n_nodes = _meridian_order(line, element)
         points, weights = get_quadrature(element, 2 * degree + 1 if quadrature is None else quadrature)
         self.n_elements, self.n_quadrature = line.nelements, points.shape[1]
         mapping = line.mapping()
         self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
-        size = np.diff(mesh.breakpoints())
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
-        self.R_x, self.Z_x = (np.ascontiguousarray(c * size) for c in mesh.tangent(self.s))
+        self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
         self._number(local, n_nodes)
@@ -64,8 +68,9 @@ class Space:
         self.numbers = numbers
         self.gather = np.concatenate([numbers[local, 0], numbers[local, 1]])
         self.half_bandwidth = min(2 * self.degree + 1, max(self.n_free - 1, 0))
-        self.fields = tuple(np.sort(column[column < self.n_free]) for column in numbers.T)
+        self.fields = tuple(_as_slice(np.sort(column[column < self.n_free])) for column in numbers.T)
         self.pole = int(numbers[0, 1])
+        self.first_height = float(self.mesh.position(self.ends[:1])[1][0])
 
     def _tabulate(self, points: Array) -> None:
         value, slope = self.shape_functions(points[0])
@@ -97,11 +102,13 @@ class Space:
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
-        return float(self.mesh.position(self.mesh.breakpoints()[:1])[1][0] + self.extend(x)[self.pole])
+        return float(self.first_height + (x[self.pole] if self.pole < self.n_free else 0.0))
 
     def extend(self, x: Array) -> Array:
         """Free coefficients with the zero of the supports appended, so that ``extend(x)[numbers]`` covers all nodes."""
-        return np.append(x, 0.0)
+        extended = np.empty(self.n_free + 1)
+        extended[:-1], extended[-1] = x, 0.0
+        return extended
 
     def at_quadrature(self, x: Array) -> Array:
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
@@ -175,8 +182,7 @@ class Space:
 
     def interpolation_points(self) -> Array:
         """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""
-        ends = self.mesh.breakpoints()
-        return ends[:-1] + _lobatto(self.degree)[:, None] * np.diff(ends)
+        return self.ends[:-1] + _lobatto(self.degree)[:, None] * self.sizes
 
     def node_parameters(self) -> Array:
         """Parameters s of the nodes along the meridian: element ends and degree - 1 points between, shape (degree n_elements + 1,)."""
@@ -185,9 +191,9 @@ class Space:
 
     def locate(self, s: ArrayLike) -> tuple[NDArray[np.int64], Array]:
         """Element and reference coordinate of parameters s."""
-        ends, s = self.mesh.breakpoints(), np.asarray(s, dtype=float)
-        element = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, self.n_elements - 1)
-        return element, (s - ends[element]) / (ends[element + 1] - ends[element])
+        s = np.asarray(s, dtype=float)
+        element = np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, self.n_elements - 1)
+        return element, (s - self.ends[element]) / self.sizes[element]
 
     def evaluate(self, x: Array, s: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """(u, u_s, w, w_s) at parameters s, slopes with respect to s; at an element end those of the element that starts there."""
@@ -195,10 +201,38 @@ class Space:
         value, slope = self.shape_functions(xi)
         coefficients = self.extend(x)[self.gather[:, element]]
         n_local = self.degree + 1
-        size = np.diff(self.mesh.breakpoints())[element]
+        size = self.sizes[element]
         u, w = (np.einsum("qa,aq->q", value, c) for c in (coefficients[:n_local], coefficients[n_local:]))
         u_s, w_s = (np.einsum("qa,aq->q", slope, c) / size for c in (coefficients[:n_local], coefficients[n_local:]))
         return u, u_s, w, w_s
+
+    def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
+        """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.
+
+        The slope of a finite-element solution of degree p is superconvergent at the p Gauss points of an element. A polynomial through
+        those of two neighbours gives the slope at the end they share, one through the ends and the Gauss points of an element the rest.
+        From degree 4 on the slopes themselves are the better ones at pole and rim (measured), and are returned as they are.
+        """
+        element, xi = self.locate(s)
+        if self.n_elements == 1 or self.degree > _RECOVERED:
+            _, u_s, _, w_s = self.evaluate(x, s)
+            return u_s, w_s
+        gauss = (np.polynomial.legendre.leggauss(self.degree)[0] + 1) / 2
+        ends, size = self.ends, self.sizes
+        n_local = self.degree + 1
+        slope = self.shape_functions(gauss)[1]
+        coefficients = self.extend(x)[self.gather]
+        at_gauss = np.stack([slope @ coefficients[:n_local], slope @ coefficients[n_local:]]) / size  # (2, degree, n_elements)
+        # at an end the polynomial through the points of the elements beside it; the first and the last end take the nearest two
+        left = np.clip(np.arange(self.n_elements + 1) - 1, 0, self.n_elements - 2)
+        unit = size[left]
+        points = np.concatenate([gauss[:, None] * np.ones_like(unit), 1 + gauss[:, None] * size[left + 1] / unit])
+        weights = _lagrange(points, (ends - ends[left]) / unit)
+        at_ends = np.einsum("gn,fgn->fn", weights, np.concatenate([at_gauss[:, :, left], at_gauss[:, :, left + 1]], axis=1))
+        nodes = np.concatenate([[0.0], gauss, [1.0]])
+        values = np.concatenate([at_ends[:, None, :-1], at_gauss, at_ends[:, None, 1:]], axis=1)[:, :, element]
+        u_s, w_s = np.einsum("gn,fgn->fn", _lagrange(np.repeat(nodes[:, None], xi.size, axis=1), xi), values)
+        return u_s, w_s
 
 
 @lru_cache(maxsize=32)
@@ -210,6 +244,23 @@ def space_of(mesh: Meridian, degree: int) -> Space:
 def _sum_by(index: NDArray[np.int64], values: Array, length: int) -> Array:
     total: Array = np.bincount(index, values.ravel(), length)  # type: ignore[assignment]  # with weights the counts are floats
     return total
+
+
+def _as_slice(index: NDArray[np.int64]) -> slice | NDArray[np.int64]:
+    """The same selection as a slice where the numbers are evenly spaced: a view instead of a copy."""
+    if index.size > 2 and (np.diff(index) == index[1] - index[0]).all():
+        return slice(int(index[0]), int(index[-1]) + 1, int(index[1] - index[0]))
+    return index
+
+
+def _lagrange(points: Array, at: Array) -> Array:
+    """Lagrange polynomials through points (m, n), each column at its own place (n,), shape (m, n)."""
+    result = np.ones_like(points)
+    for i in range(len(points)):
+        for j in range(len(points)):
+            if j != i:
+                result[i] *= (at - points[j]) / (points[i] - points[j])
+    return result
 
 
 def _line_element(degree: int) -> skfem.Element:

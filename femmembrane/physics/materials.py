@@ -28,6 +28,9 @@ class Material(Protocol):
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
         """(dW/de_1, dW/de_2) = (lambda_1 W_1, lambda_2 W_2) in units of mu."""
 
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+        """Second derivatives (W_11, W_12, W_22) with respect to e_1 and e_2: half the cost of the potential is saved by closed forms."""
+
 
 @dataclass(frozen=True)
 class Ogden:
@@ -70,11 +73,12 @@ class Ogden:
             )
 
     def energy(self, e1: Any, e2: Any) -> Any:
-        # p + q + r cancels to second order in the strain; the product form keeps all digits (r = (1 + p)^-1 (1 + q)^-1 - 1)
+        # p + q + r cancels to second order in the strain; with (1 + p)(1 + q)(1 + r) = 1 the product form keeps all digits
         total = 0.0
         for mu, alpha in zip(self.mu, self.alpha, strict=True):
             p, q, r = _powers(alpha, e1, e2)
-            total = total + mu / alpha * (p * p + p * q + q * q + p * q * (p + q)) * (1 + r)
+            last = 1 / ((1 + p) * (1 + q)) if alpha > 0 else 1 + r  # the same, from what does not tend to 0 in tension
+            total = total + mu / alpha * (p * p + p * q + q * q + p * q * (p + q)) * last
         return total
 
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
@@ -83,6 +87,14 @@ class Ogden:
             p, q, r = _powers(alpha, e1, e2)
             s1, s2 = s1 + mu * (p - r), s2 + mu * (q - r)
         return s1, s2
+
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+        s11 = s12 = s22 = 0.0
+        for mu, alpha in zip(self.mu, self.alpha, strict=True):
+            p, q, r = _powers(alpha, e1, e2)
+            m = mu * alpha
+            s11, s12, s22 = s11 + m * (2 + p + r), s12 + m * (1 + r), s22 + m * (2 + q + r)
+        return s11, s12, s22
 
 
 @dataclass(frozen=True)
@@ -94,6 +106,9 @@ class NeoHookean:
 
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
         return Ogden((1.0,), (2.0,)).stress(e1, e2)
+
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+        return Ogden((1.0,), (2.0,)).tangent(e1, e2)
 
 
 def _powers(alpha: float, e1: Any, e2: Any) -> tuple[Any, Any, Any]:

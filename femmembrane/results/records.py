@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..potential import Potential
     from ..scene import Scene
     from ..solve.controls import Gas
+    from ..stability.frequencies import Vibration
     from ..stability.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -134,6 +135,30 @@ class Equilibrium:
             self._verdicts[key] = judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=soft)
         return self._verdicts[key]
 
+    @one_thread
+    def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:
+        """The lowest natural modes, in order of their eigenvalues and proved to be the lowest.
+
+        Parameters
+        ----------
+        azimuthal : int
+            Number of waves around the axis; 0 for axisymmetric modes.
+        count : int
+            How many modes.
+        control : {"pressure", "volume"}
+            What is held during the motion; makes a difference for axisymmetric modes only.
+
+        Raises
+        ------
+        InputError
+            For an argument that is not allowed.
+        SolveError
+            Where a compressive stress leaves the spectrum without a lowest eigenvalue.
+        """
+        from ..stability.frequencies import natural_frequencies
+
+        return natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
+
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
@@ -142,11 +167,13 @@ class SpecialPoint:
     Attributes
     ----------
     kind : str
-        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point.
+        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset.
     volume, pressure, center_height : float
     error : float
         Estimated distance, relative, of the located point from the exact one of the discrete branch.
     equilibrium : Equilibrium
+    azimuthal : int
+        For an azimuthal onset: the number of waves against which stability is lost or regained there.
     """
 
     kind: str
@@ -155,6 +182,7 @@ class SpecialPoint:
     center_height: float
     error: float
     equilibrium: Equilibrium = field(repr=False)
+    azimuthal: int = field(default=0, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +334,8 @@ def _radii(r: ArrayLike, ends: Array) -> Array:
 
 def _profile(eq: Equilibrium, s: Array) -> dict[str, Array]:
     scene, space = eq.scene, eq.potential.space
-    u, u_s, w, w_s = space.evaluate(eq.state, s)
+    u, _, w, _ = space.evaluate(eq.state, s)
+    u_s, w_s = space.recovered_slopes(eq.state, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
     pole = R == 0  # there u/R is the limit u_s/R_s
     e1 = meridional_strain(R_s, Z_s, u_s, w_s)

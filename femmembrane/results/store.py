@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from ..scene import Scene
     from ..stability.verdict import Verdict
-    from .records import Branch, Equilibrium, SpecialPoint
+    from .records import Branch, Equilibrium, Jump, SpecialPoint, TraceMemory
 
 FORMAT = 1
 
@@ -56,6 +56,12 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "total_stress_2": ("circumferential total stress over mu", "1"),
     "kind": ("kind of the special point", "1"),
     "error": ("uncertainty of the special point's location", "1"),
+    "azimuthal": ("number of waves around the axis of the instability that sets in", "1"),
+    "trace_sigma": ("arc length at the last points of the trace", "1"),
+    "trace_point": ("state and pressure at the last points of the trace", "1"),
+    "trace_slope": ("their derivatives with respect to arc length", "1"),
+    "jump_index": ("number of the equilibrium that a snap of the membrane landed on", "1"),
+    "jump_limit": ("whether the fold before the snap was located", "1"),
 }
 
 Array = NDArray[np.float64]
@@ -63,8 +69,9 @@ Array = NDArray[np.float64]
 _Variable = tuple[tuple[str, ...], Any]
 
 _SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "seconds")
-_SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error")
-_AT_SPECIAL = "special_equilibrium_"
+_SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
+#: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
+_SPECIAL, _LIMIT = "special_", "limit_"
 _STABLE = {"stable": True, "unstable": False, "marginal": None}
 #: in place of a number of negative directions that was not determined
 _UNCOUNTED = -1
@@ -106,7 +113,16 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
     for tag, control, azimuthal in _asked(branch.scene):
         variables |= _verdict_variables(tag, [e.verdict(control, azimuthal=azimuthal) for e in branch])
     if branch.special_points is not None:
-        variables |= _special_variables(branch.special_points, width)
+        variables |= _special_variables(branch.special_points, width, _SPECIAL)
+    if branch.jumps:
+        limits = [jump.limit for jump in branch.jumps if jump.limit is not None]
+        variables["jump_index"] = ("jump",), _array("jump_index", (jump.index for jump in branch.jumps))
+        variables["jump_limit"] = ("jump",), _array("jump_limit", (jump.limit is not None for jump in branch.jumps))
+        variables |= _special_variables(limits, width, _LIMIT)
+    if branch.memory is not None:
+        variables["trace_sigma"] = ("trace",), np.array(branch.memory.sigma)
+        variables["trace_point"] = ("trace", "unknown"), branch.memory.points
+        variables["trace_slope"] = ("trace", "unknown"), branch.memory.slopes
     described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
     coordinates = {name: described.pop(name) for name in ("step", "r") if name in described}
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
@@ -197,11 +213,9 @@ def _asked(scene: Scene) -> list[tuple[str, str | None, int]]:
 
 def _verdict_variables(tag: str, verdicts: Sequence[Verdict]) -> dict[str, _Variable]:
     """All of the verdicts of one class that the columns of the table leave out, and :func:`_verdicts` needs to build them again."""
-    from .table import verdict_text
-
     counts = (_UNCOUNTED if v.negative_directions is None else v.negative_directions for v in verdicts)
     variables: dict[str, _Variable] = {
-        f"verdict_{tag}": (("step",), _array("verdict_", (verdict_text(v) for v in verdicts))),
+        f"verdict_{tag}": (("step",), _array("verdict_", (v.word for v in verdicts))),
         f"lambda_error_{tag}": (("step",), _array("error", (v.error for v in verdicts))),
         f"negative_directions_{tag}": (("step",), _array("negative_directions", counts)),
         f"reason_{tag}": (("step",), _array("reason", (v.reason for v in verdicts))),
@@ -221,15 +235,16 @@ def _shape(verdict: Verdict) -> dict[str, Array]:
     return {**{key: values for key, values in mode.items() if key != "r"}, "coefficients": verdict.coefficients}
 
 
-def _special_variables(points: Sequence[SpecialPoint], width: int) -> dict[str, _Variable]:
-    numbers = {f"special_{name}": (("special_point",), _array(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
-    kinds: dict[str, _Variable] = {"special_kind": (("special_point",), _array("kind", (str(p.kind) for p in points)))}
-    return {**kinds, **numbers, **_equilibrium_variables([p.equilibrium for p in points], width, "special_point", _AT_SPECIAL)}
+def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, _Variable]:
+    dimension = prefix + "point"
+    numbers = {prefix + name: ((dimension,), _array(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
+    kinds: dict[str, _Variable] = {prefix + "kind": ((dimension,), _array("kind", (str(p.kind) for p in points)))}
+    return {**kinds, **numbers, **_equilibrium_variables([p.equilibrium for p in points], width, dimension, prefix + "equilibrium_")}
 
 
 def _array(name: str, values: Iterable[Any]) -> NDArray[Any]:
     """Values of a column in the type that the file gives it, whatever their number."""
-    if name in ("step", "iterations", "negative_directions"):
+    if name in ("step", "iterations", "negative_directions", "azimuthal", "jump_index", "jump_limit"):
         return np.array(list(values), dtype=np.int64)
     if name in ("status", "kind", "reason") or name.startswith("verdict_"):
         return np.array(list(values), dtype=str)
@@ -237,7 +252,8 @@ def _array(name: str, values: Iterable[Any]) -> NDArray[Any]:
 
 
 def _describe(name: str) -> dict[str, str]:
-    base = name.removeprefix(_AT_SPECIAL).removeprefix("special_")
+    prefix = next((p for p in (_SPECIAL, _LIMIT) if name.startswith(p)), "")
+    base = name.removeprefix(prefix).removeprefix("equilibrium_")
     meaning, unit = MEANING.get(base) or (_about_verdict(base), "1")
     return {"long_name": meaning if base == name else f"{meaning}, at the special point", "units": unit}
 
@@ -267,6 +283,7 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "message": branch.message,
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
+        **({"trace_step": branch.memory.step, "trace_regular": branch.memory.regular} if branch.memory is not None else {}),
     }
 
 
@@ -287,17 +304,8 @@ def _read(path: str | PathLike[str]) -> xarray.Dataset:
 
 
 def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
-    from .records import Branch, SpecialPoint
+    from .records import Branch
 
-    special = None
-    if "special_kind" in dataset:
-        kinds = [str(k) for k in dataset["special_kind"].values]
-        numbers = zip(*(dataset[f"special_{name}"].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
-        states = _equilibria(dataset, scene, _AT_SPECIAL)
-        special = tuple(
-            SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e)
-            for k, n, e in zip(kinds, numbers, states, strict=True)
-        )
     equilibria = tuple(_equilibria(dataset, scene))
     for tag, control, azimuthal in _asked(scene):
         for equilibrium, verdict in zip(equilibria, _verdicts(dataset, tag, control, azimuthal), strict=True):
@@ -305,11 +313,47 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
     return Branch(
         scene=scene,
         equilibria=equilibria,
-        special_points=special,
+        special_points=_special_points(dataset, scene, _SPECIAL),
         status=Status(dataset.attrs["status"]),
         message=str(dataset.attrs["message"]),
         timings=json.loads(dataset.attrs["timings"]),
+        memory=_memory(dataset),
+        jumps=_jumps(dataset, scene, equilibria),
     )
+
+
+def _special_points(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple[SpecialPoint, ...] | None:
+    from .records import SpecialPoint
+
+    if prefix + "kind" not in dataset:
+        return None
+    kinds = [str(k) for k in dataset[prefix + "kind"].values]
+    numbers = zip(*(dataset[prefix + name].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
+    states = _equilibria(dataset, scene, prefix + "equilibrium_")
+    return tuple(
+        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e)
+        for k, n, e in zip(kinds, numbers, states, strict=True)
+    )
+
+
+def _memory(dataset: xarray.Dataset) -> TraceMemory | None:
+    from .records import TraceMemory
+
+    if "trace_sigma" not in dataset:
+        return None
+    points, slopes = (np.array(dataset[name].values, dtype=np.float64) for name in ("trace_point", "trace_slope"))
+    sigma = tuple(dataset["trace_sigma"].values.tolist())
+    return TraceMemory(sigma, points, slopes, float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"]))
+
+
+def _jumps(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:
+    from .records import Jump
+
+    if "jump_index" not in dataset:
+        return ()
+    limits = iter(_special_points(dataset, scene, _LIMIT) or ())
+    located = zip(dataset["jump_index"].values.tolist(), dataset["jump_limit"].values.tolist(), strict=True)
+    return tuple(Jump(index, next(limits) if known else None, equilibria[index]) for index, known in located)
 
 
 def _equilibria(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> list[Equilibrium]:

@@ -13,7 +13,6 @@ from .store import replace_file
 if TYPE_CHECKING:
     import pandas
 
-    from ..stability.verdict import Verdict
     from .records import Branch, Equilibrium
 
 #: the order in which verdicts of the two controls are listed
@@ -39,18 +38,13 @@ def columns(branch: Branch) -> list[str]:
     ]
 
 
-def verdict_text(verdict: Verdict) -> str:
-    """One of ``stable``, ``unstable`` and ``marginal``."""
-    return "marginal" if verdict.stable is None else "stable" if verdict.stable else "unstable"
-
-
 def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str:
     """One cell: what a column says about the equilibrium at a step."""
     if column == "step":
         return step
     kind, _, name = column.partition("_")
     if kind == "verdict":
-        return verdict_text(equilibrium.verdict(name))
+        return equilibrium.verdict(name).word
     if kind == "lambda":
         verdict = equilibrium.verdict(azimuthal=int(name[1:])) if name[1:].isdigit() else equilibrium.verdict(name)
         return float(verdict.smallest_eigenvalue)
@@ -72,14 +66,19 @@ def write_csv(branch: Branch, path: str | PathLike[str]) -> None:
 
 
 def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
-    """One row (kind, volume, pressure, center_height, error) for each special point of the branch."""
+    """One row for each special point of the branch, in the order of :func:`special_point_columns`."""
     for point in branch.special_points or ():
-        yield [str(point.kind), *(_number(getattr(point, name)) for name in SPECIAL_POINT_COLUMNS[1:])]
+        yield [getattr(point, name) for name in special_point_columns(branch)]
+
+
+def special_point_columns(branch: Branch) -> list[str]:
+    """Columns of ``special_points.csv``: kind, volume, pressure, center_height, error, and azimuthal if such modes were asked for."""
+    return [*SPECIAL_POINT_COLUMNS, *(["azimuthal"] if branch.scene.analysis.azimuthal_modes else [])]
 
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the special points; no rows means that the branch was searched and has none."""
-    _write(path, list(SPECIAL_POINT_COLUMNS), special_point_rows(branch))
+    _write(path, special_point_columns(branch), special_point_rows(branch))
 
 
 def to_dataframe(branch: Branch) -> pandas.DataFrame:
@@ -87,10 +86,6 @@ def to_dataframe(branch: Branch) -> pandas.DataFrame:
     import pandas
 
     return pandas.DataFrame(list(rows(branch)), columns=columns(branch))
-
-
-def _number(number: Any) -> Any:
-    return number if number is None else float(number)
 
 
 def _write(path: str | PathLike[str], header: list[str], body: Iterator[list[Any]]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import sparse
 from scipy.linalg import blas, lapack
@@ -13,11 +15,11 @@ from ..potential import Array
 class BandFactor:
     """LU factors of a band matrix in LAPACK general storage, shape (3 kd + 1, n), with partial pivoting."""
 
-    def __init__(self, band: Array, half_bandwidth: int) -> None:
-        self.kd = half_bandwidth
-        self._lu, self._pivots, info = lapack.dgbtrf(band, half_bandwidth, half_bandwidth)
+    def __init__(self, band: Array) -> None:
+        self.kd = (band.shape[0] - 1) // 3
+        self._lu, self._pivots, info = lapack.dgbtrf(band, self.kd, self.kd)
         if info > 0:  # an exact zero pivot: perturbed at round-off, as inverse iteration does; the bordered solve stays well defined
-            diagonal = self._lu[2 * half_bandwidth]
+            diagonal = self._lu[2 * self.kd]
             diagonal[diagonal == 0] = np.finfo(float).eps * (np.abs(band).max() or 1.0)
 
     def solve(self, right: Array) -> Array:
@@ -44,8 +46,10 @@ class BorderedFactor:
 
     def __init__(self, factor: BandFactor, column: Array, row: Array, corner: float) -> None:
         self._factor, self._column, self._row, self._corner = factor, column, row, corner
-        both = factor.solve(np.stack([row, column], axis=1))
-        self._v, self._w = both[:, 0], both[:, 1]
+        borders = np.empty((len(row), 2), order="F")
+        borders[:, 0], borders[:, 1] = row, column
+        borders = factor.solve(borders)
+        self._v, self._w = borders[:, 0], borders[:, 1]
         self._delta_v = corner - self._v @ column
         self._delta_w = corner - row @ self._w
 
@@ -86,7 +90,8 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
     n, kd = band.shape[1], half_bandwidth
     upper = band[kd : 2 * kd + 1]
     borders = np.zeros((n, 0)) if constraint is None else constraint[:, None]
-    for count in (0, 4, 16, 64, 256, 1024):
+    # under a constraint one direction of K itself is usually negative already: pinning at once saves a factorisation that fails
+    for count in (0, 4, 16, 64, 256, 1024) if constraint is None else (4, 16, 64, 256, 1024):
         pins = _spread(n, count)
         pinned = _pin(upper, pins)
         factor, info = lapack.dpbtrf(pinned)
@@ -105,12 +110,16 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
             schur[:k, k:] += borders[pins]
             schur[k:, :k] += borders[pins].T
             schur[k:, k:] -= compliance
+            size = np.abs(np.diag(schur))
+            unit = 1 / np.sqrt(np.where(size > 0, size, 1.0))  # a congruence: u and w of a nearly flat membrane differ by many decades
+            schur *= np.outer(unit, unit)
             return int((np.linalg.eigvalsh(schur) < 0).sum()) - borders.shape[1]
         if count >= n:
             break
     return _sparse_count(band, kd, constraint, compliance)
 
 
+@lru_cache(maxsize=64)
 def _spread(n: int, count: int) -> np.ndarray:
     """Unknowns to pin, spread evenly; the first ones belong to the pole."""
     return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
@@ -143,7 +152,11 @@ def _sparse_count(band: Array, kd: int, constraint: Array | None, compliance: fl
     """Count by sparse L D L^T without pivoting, for matrices with very many negative directions."""
     n = band.shape[1]
     matrix = sparse.dia_array((band[kd:], np.arange(kd, -kd - 1, -1)), shape=(n, n)).tocsc()
-    lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    try:
+        lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:  # exactly singular: directions without stiffness, such as those of the flat unloaded disc, are not negative ones
+        nudge = np.finfo(float).eps * np.abs(band).max() * sparse.eye_array(n, format="csc")
+        lu = splu(matrix + nudge, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     count = int((lu.U.diagonal() < 0).sum())
     if constraint is None:
         return count

@@ -115,7 +115,10 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
         return None, result.iterations, 0.5
     miss = np.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
     state = State.of(result)
-    new = tangent_at(potential, state, point)
+    # the border of this control is the tangent before: the corrector's last factors give the new one for a back-substitution
+    new = _normalised(potential, state, point.sigma, *result.bordered.solve(np.zeros_like(state.x), 1.0)) if result.bordered else None
+    if new is None:
+        return None, result.iterations, 0.5
     cosine = float(point.dual @ new.tangent + point.tangent_pressure * new.tangent_pressure)
     angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
     if angle > 2 * control.turn or miss > 50 * control.deviation:

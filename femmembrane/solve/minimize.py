@@ -7,6 +7,7 @@ problem to IPOPT as a well inflated one.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -14,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..errors import Status
-from ..potential import Array, Evaluation, Potential
+from ..potential import Array, Evaluation, Potential, vectorise
 from .banded import negative_directions
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct
@@ -26,6 +27,21 @@ _OPTIONS: dict[str, Any] = {
     "calc_lam_x": False,
     "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-9, "acceptable_iter": 0},
 }
+
+
+@dataclass(frozen=True)
+class NlpFunctions:
+    """E - P V under a scaling of the unknowns, x = scale_u y_u and x = scale_w y_w, as CasADi functions for ``nlpsol``.
+
+    Parameters ``p`` of all: (P, magnetic factor, scale of u, of w, of the objective, of the volume).
+    """
+
+    value: ca.Function
+    gradient: ca.Function
+    hessian: ca.Function
+    volume: ca.Function
+    volume_gradient: ca.Function
+    sparsity: ca.Sparsity
 
 
 def minimize(
@@ -71,7 +87,7 @@ def minimize(
 
 @lru_cache(maxsize=32)
 def _solver(potential: Potential, constrained: bool, max_iterations: int) -> ca.Function:
-    functions = potential.nlp
+    functions = nlp_functions(potential)
     y, p = ca.MX.sym("y", potential.space.n_free), ca.MX.sym("p", 6)
     problem = {"x": y, "p": p, "f": functions.value(y, p)}
     options = _OPTIONS | {"grad_f": functions.gradient, "ipopt": _OPTIONS["ipopt"] | {"max_iter": max_iterations}}
@@ -94,6 +110,8 @@ def minimize_and_verify(
     NewtonResult
         Status NOT_A_MINIMUM when forces balance but the second variation has a negative direction under this control.
     """
+    if not np.isfinite(potential.evaluate(x, pressure, magnetic).energy):  # outside the domain of the energy: nothing to scale by
+        return correct(potential, control, x, pressure, magnetic=magnetic)
     found, p, iterations, _ = minimize(potential, control, x, pressure, magnetic=magnetic, max_iterations=max_iterations)
     if not (np.isfinite(found).all() and np.isfinite(p)):
         found, p = x, pressure
@@ -108,3 +126,47 @@ def is_minimum(potential: Potential, control: Control, evaluation: Evaluation) -
     """Whether the second variation has no negative direction under volume or pressure control."""
     constraint = evaluation.volume_gradient if isinstance(control, VolumeControl) else None
     return negative_directions(evaluation.band, potential.space.half_bandwidth, constraint) == 0
+
+
+@lru_cache(maxsize=32)
+def nlp_functions(potential: Potential) -> NlpFunctions:
+    """Assemble the point functions of a potential into functions of all unknowns; built once."""
+    space, n = potential.space, potential.n_points
+    y, p = ca.MX.sym("y", space.n_free), ca.MX.sym("p", 6)
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g")
+    is_u = np.zeros(space.n_free)
+    is_u[space.fields[0]] = 1.0
+    scale = is_u * p[2] + (1 - is_u) * p[3]
+    local = ca.reshape(ca.mtimes(ca.DM(space.evaluation_matrix()), scale * y), n, 4)
+    data = ca.DM(potential.point_data.T)
+
+    def assembled(function: ca.Function, parameters: ca.MX) -> ca.MX:
+        return vectorise(function, n)(data, local, parameters)
+
+    plain = ca.vertcat(0.0, p[1])
+    t, symbols = potential.terms, list(potential.symbols)
+    values = assembled(
+        ca.Function("values", symbols, [ca.densify(ca.vertcat(t["elastic"] + t["magnetic"], t["volume"]))], {"cse": True}), plain
+    )
+    gradients = assembled(
+        ca.Function("gradients", symbols, [ca.densify(ca.vertcat(t["gradient"], t["volume_gradient"]))], {"cse": True}), plain
+    )
+    integrate = ca.DM(space.evaluation_matrix().T)
+    e_x, v_x = (scale * ca.mtimes(integrate, ca.vec(gradients[:, k : k + 4])) for k in (0, 4))
+    energy, volume = ca.sum1(values[:, 0]), ca.sum1(values[:, 1])
+    rows, columns, integrator = space.hessian_matrix()
+    # the Lagrangian lam_f (E - P V)/objective + lam_g V/volume has the Hessian of E - q V with this q
+    multiplier = p[0] - lam_g / lam_f * p[4] / p[5]
+    second = assembled(potential.point_function, ca.vertcat(multiplier, p[1]))[:, 11:21]
+    entries = ca.mtimes(ca.DM(integrator), ca.vec(second)) * (scale[rows] * scale[columns]) * (lam_f / p[4])
+    sparsity = ca.Sparsity.triplet(space.n_free, space.n_free, rows, columns)
+    hessian = ca.MX(sparsity, entries)
+    f = (energy - p[0] * volume) / p[4]
+    return NlpFunctions(
+        value=ca.Function("nlp_f", [y, p], [f]),
+        gradient=ca.Function("nlp_grad_f", [y, p], [f, (e_x - p[0] * v_x) / p[4]]),
+        hessian=ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [hessian]),
+        volume=ca.Function("nlp_g", [y, p], [volume / p[5]]),
+        volume_gradient=ca.Function("nlp_jac_g", [y, p], [volume / p[5], v_x.T / p[5]]),
+        sparsity=sparsity,
+    )

@@ -13,16 +13,22 @@ from .controls import Control
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
+#: relative residual that a state must show whose own correction was not computed
+RESIDUAL = 1e-9
 
 
 @dataclass(slots=True)
 class NewtonResult:
-    """Where the corrector ended; ``correction`` is the relative size of the last Newton correction, which was not applied."""
+    """Where the corrector ended.
+
+    ``correction`` is the relative size of the Newton correction at x, computed or foretold by the quadratic convergence of those before;
+    ``residual`` and ``gap`` are evaluated at x; ``bordered`` are the last factors, at x or one correction before.
+    """
 
     x: Array
     pressure: float
     evaluation: Evaluation
-    factor: BandFactor | None
+    bordered: BorderedFactor | None
     iterations: int
     correction: float
     residual: float
@@ -57,7 +63,8 @@ def correct(
     Returns
     -------
     NewtonResult
-        ``status`` is CONVERGED only if the last correction, relative to the size of u and of w, is below the tolerance.
+        ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
+        foretold from two corrections in quadratic convergence and confirmed by the residual at x.
     """
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration = np.inf, 0
@@ -70,33 +77,57 @@ def correct(
         done = size <= tolerance
         stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
-            status = Status.CONVERGED if done else Status.NOT_CONVERGED
-            residual = relative_residual(potential, equations.force, evaluation, pressure)
-            return NewtonResult(x, pressure, evaluation, equations.factor, iteration, size, residual, equations.gap, status)
+            return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
-        previous, iteration = size, iteration + 1
+        iteration += 1
+        # quadratic convergence, c_next = (c/c_previous)^2 c at most, spares the last factorisation; the residual has the last word
+        foretold = size * (size / previous) ** 2 if length == 1 else np.inf
+        if foretold <= tolerance / 10:
+            last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
+            result = last.result(iteration, foretold, Status.CONVERGED)
+            if result.residual <= RESIDUAL:
+                return result
+        previous = size
 
 
 class Equations:
     """Residuals and bordered factors at one state."""
 
-    def __init__(self, potential: Potential, control: Control, x: Array, pressure: float, evaluation: Evaluation) -> None:
-        self.potential, self.control, self.x, self.pressure = potential, control, x, pressure
+    def __init__(
+        self,
+        potential: Potential,
+        control: Control,
+        x: Array,
+        pressure: float,
+        evaluation: Evaluation,
+        bordered: BorderedFactor | None = None,
+    ) -> None:
+        self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
         self.gap, row, corner = control.equation(potential.space, x, pressure, evaluation)
-        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.band).all())
-        if self.finite:
-            self.factor = BandFactor(evaluation.band, potential.space.half_bandwidth)
-            self._bordered = BorderedFactor(self.factor, -evaluation.volume_gradient, row, corner)
+        self.finite = bool(np.isfinite(self.force).all())
+        if bordered is None and self.finite:
+            bordered = BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
+        self.bordered = bordered
 
     def newton_step(self) -> tuple[Array, float]:
-        return self._bordered.solve(-self.force, -self.gap)
+        return self._factored.solve(-self.force, -self.gap)
+
+    def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
+        residual = relative_residual(self.potential, self.force, self.evaluation, self.pressure)
+        return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, residual, self.gap, status)
+
+    @property
+    def _factored(self) -> BorderedFactor:
+        if self.bordered is None:
+            raise ArithmeticError("no factors where the energy is undefined")
+        return self.bordered
 
     def simplified_step(self, force: Array, gap: float) -> Array:
         """The correction that the factors here give for residuals elsewhere."""
-        return self._bordered.solve(-force, -gap)[0]
+        return self._factored.solve(-force, -gap)[0]
 
 
 def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
@@ -116,12 +147,15 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
 
 def relative_size(potential: Potential, dx: Array, x: Array) -> float:
     """Largest change of u and of w, each relative to its own size: on a nearly flat membrane u is of order w^2."""
-    sizes = [0.0]
+    change, size = np.abs(dx), np.abs(x)
+    largest = 0.0
     for index in potential.space.fields:
-        change = float(np.abs(dx[index]).max(initial=0.0))
-        if change > 0:
-            sizes.append(change / max(float(np.abs(x[index]).max()), change))
-    return max(sizes) if bool(np.isfinite(dx).all()) else float(np.inf)
+        c = float(change[index].max(initial=0.0))  # NaN propagates
+        if c > 0:
+            largest = max(largest, c / max(float(size[index].max()), c))
+        elif c != 0:
+            return np.inf
+    return largest
 
 
 def relative_residual(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> float:

@@ -84,6 +84,8 @@ class Parameter:
             return self.scene.replace(susceptibility=value)
         if part == "material":
             material: Any = self.scene.material
+            if rest.startswith("mu."):
+                self._check_modulus(value, material.alpha[int(rest[3:])])
             return self.scene.replace(material=dataclasses.replace(material, **self._material_numbers(rest, value)))
         index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
         sources: list[Any] = list(self.scene.sources)
@@ -98,6 +100,8 @@ class Parameter:
         susceptibility = scene.susceptibility
         if part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
+        elif rest.startswith("alpha."):
+            material = _with_exponent(material, int(rest[6:]), value)
         elif part == "material":
             material = _unchecked(material, **self._material_numbers(rest, value))
         else:
@@ -107,6 +111,11 @@ class Parameter:
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         return SimpleNamespace(material=material, sources=sources, susceptibility=susceptibility, mesh=scene.mesh, degree=scene.degree)
+
+    def _check_modulus(self, value: float, alpha: float) -> None:
+        if not 0 < value * alpha < 2:
+            allowed = f"values between 0 and {2 / alpha:.9g} are allowed: the other moduli share what is left of the sum of mu alpha = 2"
+            raise InputError(self.name, value, allowed)
 
     def _material_numbers(self, rest: str, value: Any) -> dict[str, Any]:
         name, _, index = rest.partition(".")
@@ -162,3 +171,47 @@ class _Scaled:
         h_rho, h_z = self.source.field(rho, eta)
         amplitude = np.sqrt(self.factor + _TINY)
         return amplitude * h_rho, amplitude * h_z
+
+    def intensity(self, rho: Any, eta: Any) -> Any:
+        return self.factor * self.source.intensity(rho, eta)
+
+
+def _with_exponent(material: Any, k: int, value: Any) -> Any:
+    """Ogden's material with another exponent in term k, of unchanged sign, and mu_k alpha_k as it was."""
+    rest = _unchecked(material, **{key: getattr(material, key)[:k] + getattr(material, key)[k + 1 :] for key in ("mu", "alpha")})
+    term = _unchecked(material, mu=material.mu[k : k + 1], alpha=material.alpha[k : k + 1])
+    return _Sum((rest, _Stretched(term, value / material.alpha[k])))
+
+
+@dataclass(frozen=True)
+class _Stretched:
+    """A material at strains multiplied by a ratio, with the same modulus: W(t e)/t^2. It takes alpha to t alpha and mu to mu/t."""
+
+    material: Any
+    ratio: Any
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        return self.material.energy(self.ratio * e1, self.ratio * e2) / self.ratio**2
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        s1, s2 = self.material.stress(self.ratio * e1, self.ratio * e2)
+        return s1 / self.ratio, s2 / self.ratio
+
+    def tangent(self, e1: Any, e2: Any) -> Any:
+        return self.material.tangent(self.ratio * e1, self.ratio * e2)
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """Two materials side by side."""
+
+    parts: tuple[Any, Any]
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        return sum(part.energy(e1, e2) for part in self.parts)
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, ...]:
+        return tuple(a + b for a, b in zip(*(part.stress(e1, e2) for part in self.parts), strict=True))
+
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, ...]:
+        return tuple(a + b for a, b in zip(*(part.tangent(e1, e2) for part in self.parts), strict=True))

@@ -100,12 +100,16 @@ class Segment:
 
     def _fold(self, kind: str, low: float, high: float) -> Located:
         quantity = FOLDS[kind]
-        share = brentq(lambda s: self.at(s).rate(quantity, self.potential), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+        return self.root(kind, lambda point: point.rate(quantity, self.potential), low, high)
+
+    def root(self, kind: str, function: Callable[[BranchPoint], float], low: float, high: float) -> Located:
+        """The point between two shares of the segment where a function of the point changes sign."""
+        share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
         point = self.at(share)
         h = 1e-3 * (high - low)
         near = self.at(share + h if share + h < high else share - h)
-        slope = (near.rate(quantity, self.potential) - point.rate(quantity, self.potential)) / (near.sigma - point.sigma)
-        offset = abs(point.rate(quantity, self.potential) / slope) + point.state.correction
+        slope = (function(near) - function(point)) / (near.sigma - point.sigma)
+        offset = abs(function(point) / slope) + point.state.correction
         moved = max(abs(point.rate(q, self.potential)) * offset / (1 + abs(self.value(q, point))) for q in FOLDS.values())
         return Located(kind, point, float(moved + point.state.correction))
 

@@ -50,8 +50,12 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     """
     magnetic = bool(potential.sources)
     if magnetic and abs(volume) < START_VOLUME:
-        first = start_at_volume(potential, START_VOLUME)
-        return march(potential, first, VolumeControl, START_VOLUME, volume)[-1]
+        # from the side of the wanted volume first, so that a mirrored scene takes the mirrored path
+        side = float(np.copysign(START_VOLUME, volume))
+        try:
+            return march(potential, start_at_volume(potential, side), VolumeControl, side, volume)[-1]
+        except SolveError:
+            return march(potential, start_at_volume(potential, -side), VolumeControl, -side, volume)[-1]
     state = _inflated(potential, volume)
     if not magnetic:
         return state
@@ -90,7 +94,8 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
         result = correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0)
         return State.of(result)
     # without sources a nearly flat membrane obeys P = 3.34 V^3, and its mirror image carries the opposite pressure
-    volume = float(np.copysign(min(START_VOLUME, (abs(pressure) / 4) ** (1 / 3)), pressure)) if flat else START_VOLUME
+    size = min(START_VOLUME, (abs(pressure) / 4) ** (1 / 3)) if flat else START_VOLUME
+    volume = float(np.copysign(size, pressure))
     state = start_at_volume(potential, volume)
     up = 1 if (state.pressure < pressure) == (first_point(potential, state, 1).rate("pressure", potential) > 0) else -1
     for direction in (up, -up):

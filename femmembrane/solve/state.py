@@ -14,29 +14,35 @@ from .newton import NewtonResult
 
 @dataclass(slots=True)
 class State:
-    """An equilibrium as the solvers see it: unknowns, the evaluation there, and the factors of K for tangents.
+    """An equilibrium as the solvers see it: unknowns, and the evaluation there.
 
-    ``correction`` is the relative size of the last Newton correction, ``gap`` the error of the control equation; both recomputed at x.
+    ``correction`` is the relative size of the Newton correction at x, ``gap`` the error of the control equation there.
     """
 
     x: Array
     pressure: float
     evaluation: Evaluation
-    factor: BandFactor
     iterations: int
     correction: float
     residual: float
     gap: float
     status: Status = Status.CONVERGED
-    seconds: float = 0.0
+    _factor: BandFactor | None = None
 
     @classmethod
     def of(cls, result: NewtonResult, extra_iterations: int = 0) -> State:
         """The state of a converged Newton result."""
-        if result.factor is None or result.status is not Status.CONVERGED:
+        if result.status is not Status.CONVERGED:
             raise ValueError("only a converged result is a state")
         iterations = result.iterations + extra_iterations
-        return cls(result.x, result.pressure, result.evaluation, result.factor, iterations, result.correction, result.residual, result.gap)
+        return cls(result.x, result.pressure, result.evaluation, iterations, result.correction, result.residual, result.gap)
+
+    @property
+    def factor(self) -> BandFactor:
+        """Factors of K at x, computed when first asked for."""
+        if self._factor is None:
+            self._factor = BandFactor(self.evaluation.band)
+        return self._factor
 
     @property
     def volume(self) -> float:

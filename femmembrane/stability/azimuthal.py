@@ -36,8 +36,9 @@ from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Potential
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from ..threads import one_thread
 from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
-from .verdict import _COMPRESSION, CONTROLS, Verdict
+from .verdict import _COMPRESSION, Verdict
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
@@ -353,6 +354,7 @@ def _density(space: Space, r: LocalResponse, pressure: float, n: int) -> list[Ar
     return [entries[pair] for pair in _PAIRS]
 
 
+@one_thread
 def azimuthal_eigenvalue(potential: Potential, x: Array, pressure: float, n: int, guess: Array | None = None) -> SmallestEigenvalue:
     """Smallest eigenvalue against n waves around the axis, proved by inertia to be the smallest.
 
@@ -394,7 +396,7 @@ class _Spectrum:
 
     def first_guess(self, width: int = 6, iterations: int = 3) -> Array:
         """Best vector of a block of inverse iterations: the lowest azimuthal eigenvalues are too close together for a single vector."""
-        solver = BandFactor(self.band - self.lower_bound() * self.mass, self.kd)
+        solver = BandFactor(self.band - self.lower_bound() * self.mass)
         block = np.random.default_rng(0).standard_normal((self.n, min(width, self.n)))
 
         def times(band: Array) -> Array:
@@ -407,7 +409,7 @@ class _Spectrum:
     def lanczos(self, count: int, width: int) -> list[tuple[float, Array]]:
         """Shift-invert Lanczos iterations from a certified lower bound."""
         shift = self.lower_bound()
-        factor = BandFactor(self.band - shift * self.mass, self.kd)
+        factor = BandFactor(self.band - shift * self.mass)
         bordered = None if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, 0.0)
 
         def inverse(right: Array) -> Array:
@@ -434,6 +436,7 @@ def _flat_product(band: Array, half_bandwidth: int, x: Array) -> Array:
     return band_product(band, half_bandwidth, x.ravel())
 
 
+@one_thread
 def lowest_eigenvalues(
     potential: Potential, x: Array, pressure: float, n: int, count: int = 4, control: str = "pressure"
 ) -> list[tuple[float, Array]]:
@@ -460,8 +463,8 @@ def lowest_eigenvalues(
     SpectrumError
         When the eigenvalues found cannot be proved to be the lowest.
     """
-    if control not in CONTROLS:
-        raise unknown_name("control", control, CONTROLS)
+    if control not in ("pressure", "volume"):
+        raise unknown_name("control", control, ("pressure", "volume"))
     operator = azimuthal_operator(potential, x, pressure, n)
     size = operator.band.shape[1]
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count < size - 1:
@@ -477,6 +480,7 @@ def lowest_eigenvalues(
     raise SpectrumError(f"the {count} eigenvalues found could not be proved to be the lowest")
 
 
+@one_thread
 def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, guess: Array | None = None) -> Verdict:
     """Verdict against n >= 1 waves around the axis; the same under pressure and volume control.
 

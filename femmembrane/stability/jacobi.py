@@ -23,6 +23,7 @@ radius e with (0, e) and slope 1 is e (1 + log(r/e)) near it, so that the printe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -30,10 +31,13 @@ from scipy.integrate import solve_ivp
 from ..discretization.meridian import disc
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..potential import Array, Potential, potential_of
-from ..results.records import Equilibrium
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
 from ..solve.newton import correct
+from ..threads import one_thread
 from .azimuthal import LocalResponse, local_response
+
+if TYPE_CHECKING:
+    from ..results.records import Equilibrium
 
 FORMS = ("corrected", "printed")
 
@@ -99,6 +103,7 @@ def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
     return LegendreTest(value > 0, value, float((response.W11 * response.N1).min() / 4), float(space.R.ravel()[at]))
 
 
+@one_thread
 def jacobi_test(equilibrium: Equilibrium, form: str = "corrected", *, start: float = 1e-4) -> JacobiTest:
     """Jacobi's condition for a minimum under pressure control.
 

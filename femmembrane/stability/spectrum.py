@@ -84,7 +84,7 @@ class _Pencil:
         self.scale = float(np.abs(band[2 * kd] / mass[2 * kd]).max())
 
     def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
-        factor = BandFactor(self.band - shift * self.mass, self.kd)
+        factor = BandFactor(self.band - shift * self.mass)
         return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, -self.compliance)
 
     def solve(self, solver: BandFactor | BorderedFactor, right: Array) -> Array:
@@ -116,11 +116,17 @@ class _Pencil:
         return mode
 
     def rayleigh(self, mode: Array, iterations: int = 8) -> tuple[float, Array, float] | None:
+        best = np.inf
         for _ in range(iterations):
-            mode, right = self.normalised(self.projected(mode))
+            mode = self.projected(mode)
+            if not mode.any():  # a guess along the constraint says nothing
+                return None
+            mode, right = self.normalised(mode)
             value, error = self.quotient(mode, right)
-            if error <= 1e-10 * abs(value) + 1e-14 * self.scale:
+            # an absolute floor alone would stop too early on a nearly flat membrane, whose modes are decades softer than the scale
+            if error <= 1e-10 * abs(value) or (error <= 1e-14 * self.scale and error > 0.5 * best):
                 return value, mode, error
+            best = min(best, error)
             mode = self.solve(self.shifted_solver(value), right)
             if not np.isfinite(mode).all():
                 return None

@@ -178,8 +178,8 @@ def _follow(
     timings = {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
-    walk = _Walk(scene, potential, control, _SOLVERS[solver], start)
     status, message = Status.CONVERGED, ""
+    walk = _Walk(scene, potential, control, _SOLVERS[solver], start)
     for index, load in enumerate(loads):
         clock = time.perf_counter()
         try:
@@ -240,6 +240,9 @@ class _Walk:
         if start is not None:
             self.state = resume(potential, start)
             self.load = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
+            if self.corrector is minimize_and_verify and not is_minimum(potential, self.control_at(self.load), self.state.evaluation):
+                message = f"the start (V = {start.volume:.6g}, P = {start.pressure:.6g}) is no minimum under {control} control"
+                raise SolveError(message, status=Status.NOT_A_MINIMUM)
 
     def to(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """The state at a load, and where the branch turned back if it had to be left for it."""

@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError, SolveError, Status, unknown_name
-from ..potential import Potential, potential_of
+from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
 from ..solve.start import start_at_volume
 from ..solve.state import Path
+from ..stability.azimuthal import azimuthal_eigenvalue
 from ..stability.verdict import compressed
 from ..threads import one_thread
 from .recording import OnStep, record, resume
@@ -175,6 +176,8 @@ class _Tracing:
             if self.special is not None:
                 self._look_for_special_points(segment, last)
             self.add(last or new, clock)
+            if self.special is not None:
+                self._look_for_onsets(segment, last or new)
             if last is not None:
                 return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
             self.point, self.regular = new, len(self.found)
@@ -215,9 +218,24 @@ class _Tracing:
                 self.special.append(self._special(fold))  # type: ignore[union-attr]
         self.timings["special_points"] += time.perf_counter() - clock
 
-    def _special(self, fold: Located) -> SpecialPoint:
+    def _look_for_onsets(self, segment: Segment, end: BranchPoint) -> None:
+        """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
+        before, after = self.found[-2:]
+        top = (end.sigma - segment.a.sigma) / segment.length
+        for n in self.scene.analysis.azimuthal_modes:
+            verdict = before.verdict(azimuthal=n)
+            if verdict.smallest_eigenvalue * after.verdict(azimuthal=n).smallest_eigenvalue < 0:  # False where either is NaN (short-wave)
+
+                def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
+                    return azimuthal_eigenvalue(self.potential, point.state.x, point.state.pressure, n, guess).value
+
+                clock = time.perf_counter()
+                self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))  # type: ignore[union-attr]
+                self.timings["special_points"] += time.perf_counter() - clock
+
+    def _special(self, fold: Located, azimuthal: int = 0) -> SpecialPoint:
         eq = record(self.scene, self.potential, fold.point.state)
-        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq)
+        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq, azimuthal=azimuthal)
 
     def _contact(self, point: BranchPoint) -> bool:
         return self.potential.distance_to_sources(point.state.x) < CONTACT

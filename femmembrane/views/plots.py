@@ -1,37 +1,41 @@
 """Plots of a branch: pressure against volume with its verdicts, and deformed meridians.
 
-Figures are made without pyplot, so that nothing global changes and no window opens. Line style and marker shape carry all that colour
-does: the figures read the same in grey.
+``plot_...`` make a whole figure; ``draw_...`` draw onto given axes, for figures of one's own. Figures are made without pyplot, so that
+nothing global changes and no window opens. Line style and marker shape carry all that colour does: the figures read the same in grey.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, Status, unknown_name
 from ..results.store import replace_file
-from ..results.table import verdict_text
 from .vtk import smooth_profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.records import Branch, Equilibrium, SpecialPoint
 
 Array = NDArray[np.float64]
 
 PRESSURE_LABEL = "pressure P = pR₀/(μT)"
 VOLUME_LABEL = "volume V/R₀³"
+HEIGHT_LABEL = "pole height η(0)/R₀"
+RADIUS_LABEL = "radius ρ/R₀"  # noqa: RUF001
+#: what an axis can show
+QUANTITIES = {"volume": VOLUME_LABEL, "pressure": PRESSURE_LABEL, "center_height": HEIGHT_LABEL}
 _DPI = 160
 #: branches of up to so many equilibria show them as dots
-_DOTS = 80
+_DOTS = 40
 #: points of a drawn meridian
 _CURVE = 201
 
@@ -53,9 +57,15 @@ MARGINAL = Style("marginal (an eigenvalue is zero)", (0, (6, 1.5, 1, 1.5)), _BLA
 BOTH = Style("stable under both controls", _SOLID, _BLUE)
 VOLUME_ONLY = Style("stable under volume control only", _DASHED, _ORANGE)
 UNSTABLE = Style("unstable under both controls", _DOTTED, _BLACK, 2.2)
+#: compressive meridional stress: what a mesh finds there depends on the mesh, stable or not
+ILL_POSED = Style("ill-posed (Legendre condition fails)", _DOTTED, "#888888", 1.2)
 #: when one control alone was asked for
 STABLE_UNDER = {c: Style(f"stable under {c} control", _SOLID, _BLUE) for c in ("pressure", "volume")}
 UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", _DOTTED, _BLACK, 2.2) for c in ("pressure", "volume")}
+
+#: the order of the lines in a legend
+_ORDER = [s.label for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED)]
+_ILL_POSED = "ill-posed"
 
 #: marker and name of each kind of special point
 MARKERS = {
@@ -65,13 +75,12 @@ MARKERS = {
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
 }
+#: the verdicts that can change at each kind of special point (all of them at a kind not listed)
+_CHANGES: dict[str, tuple[Any, ...]] = {"limit_point": ("pressure",), "volume_fold": ("volume",), "height_fold": ()}
 
 
 def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
     """Pressure against volume; line styles tell the verdicts that the scene asked for, markers the special points found.
-
-    Where two neighbouring equilibria differ, the style changes at the special point between them, or half-way. A branch whose scene asks
-    for no verdicts is one plain line.
 
     Parameters
     ----------
@@ -86,18 +95,10 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
         For an empty branch or a file that cannot be written.
     """
     _require_equilibria(branch)
-    figure, axes = _figure((6.4, 4.6), branch.scene.title)
-    axes.set_xlabel(VOLUME_LABEL)
-    axes.set_ylabel(PRESSURE_LABEL)
-    axes.grid(color="0.9", linewidth=0.6)
-    points = np.array([[e.volume, e.pressure] for e in branch])
-    special = np.array([[p.volume, p.pressure] for p in branch.special_points or ()]).reshape(-1, 2)
-    breaks = _breaks(points, special)
-    _draw_runs(axes, points, [_style(e) for e in branch], breaks)
-    _draw_azimuthal(axes, branch, points, breaks)
-    _draw_special_points(axes, branch)
-    _legend(axes, branch)
-    return _finish(figure, path)
+    figure, axes = new_figure((6.4, 4.6), title=branch.scene.title)
+    draw_branch(axes, branch)
+    draw_legend(axes, "among axisymmetric shapes:" if branch.scene.analysis.stability else None)
+    return save_figure(figure, path)
 
 
 def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count: int = 6) -> Figure:
@@ -117,24 +118,73 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
     InputError
         For an empty branch, a count below 1, or a file that cannot be written.
     """
+    from matplotlib import colormaps
+
     _require_equilibria(branch)
     if count < 1:
         raise InputError("count", count, "a whole number >= 1 is allowed")
     shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, count).round().astype(int))]
-    figure, axes = _figure((6.4, 5.6), branch.scene.title)
-    axes.set_xlabel("radius ρ/R₀")  # noqa: RUF001
-    axes.set_ylabel("height η/R₀")
-    axes.set_aspect("equal", adjustable="box")
-    axes.locator_params(nbins=6)
-    axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
-    _draw_meridians(axes, shown)
-    _draw_sources(axes, branch, shown)
+    figure, axes = new_figure((6.4, 5.6), title=branch.scene.title)
+    # lightness falls along the map, so that neighbours differ in grey as well
+    colors = colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2)))
+    for equilibrium, color in zip(shown, colors, strict=False):
+        label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
+        draw_profile(axes, equilibrium, Style(label, _SOLID, color))
+    draw_surroundings(axes, shown)
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], labels[::-1], loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
-    return _finish(figure, path)
+    return save_figure(figure, path)
 
 
 # --- frames
+
+
+def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[float] = (1.0,)) -> tuple[Figure, Any]:
+    """A figure of a size in inches with one axes, or a row of several of the given relative widths.
+
+    Returns
+    -------
+    figure : Figure
+    axes : Axes, or array of Axes
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
+    for axes in row:
+        axes.spines[["top", "right"]].set_visible(False)
+    text = title.replace("$", r"\$")
+    if len(widths) > 1:
+        figure.suptitle(text, fontsize=11)
+        return figure, row
+    row[0].set_title(text, fontsize=11, wrap=True)
+    return figure, row[0]
+
+
+def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
+    """Write a figure (nothing for None) whole or not at all, and return it."""
+    if path is not None:
+        with replace_file(path) as temporary:
+            figure.savefig(temporary, dpi=_DPI)
+    return figure
+
+
+def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
+    """A legend of what is named, if anything is; ``look`` goes to Matplotlib's ``legend``."""
+    handles, labels = legend_entries(axes)
+    if handles:
+        usual: dict[str, Any] = {"fontsize": 9, "title_fontsize": 9, "framealpha": 0.9, "edgecolor": "none", "handlelength": 3.2}
+        legend = axes.legend(handles, labels, title=heading, **(usual | look))
+        legend.set_alignment("left")
+
+
+def legend_entries(axes: Axes) -> tuple[list[Any], list[str]]:
+    """Handles and labels of what is named, the verdicts first and always in the same order."""
+    named = list(zip(*axes.get_legend_handles_labels(), strict=True))
+    named.sort(key=lambda item: _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER))
+    return [handle for handle, _ in named], [label for _, label in named]
 
 
 def _require_equilibria(branch: Branch) -> None:
@@ -142,147 +192,239 @@ def _require_equilibria(branch: Branch) -> None:
         raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
 
 
-def _figure(size: tuple[float, float], title: str) -> tuple[Figure, Axes]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    axes.set_title(title.replace("$", r"\$"), fontsize=11, wrap=True)
-    axes.spines[["top", "right"]].set_visible(False)
-    return figure, axes
+# --- a branch
 
 
-def _finish(figure: Figure, path: str | PathLike[str] | None) -> Figure:
-    if path is not None:
-        with replace_file(path) as temporary:
-            figure.savefig(temporary, dpi=_DPI)
-    return figure
+def draw_branch(
+    axes: Axes,
+    branch: Branch,
+    *,
+    across: str = "volume",
+    up: str = "pressure",
+    style: Style | None = None,
+    dots: bool | None = None,
+    special_points: bool = True,
+) -> None:
+    """One quantity of a branch against another: verdicts as line styles, special points as markers, snaps as arrows.
+
+    A style changes at the special point where the verdict does, or half-way between two equilibria. A branch whose scene asks for no
+    verdicts is one plain line. Stretches that are unstable to an azimuthal mode have a grey band behind them; a cross marks the end of a
+    branch that could not be followed as far as was asked.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    branch : Branch
+    across, up : {"volume", "pressure", "center_height"}
+        What the axes show.
+    style : Style, optional
+        One style for the whole line, in place of the verdicts'.
+    dots : bool, optional
+        Show each equilibrium as a dot; by default when there are few.
+    special_points : bool
+        Mark the special points.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity.
+    """
+    for key, name in (("across", across), ("up", up)):
+        if name not in QUANTITIES:
+            raise unknown_name(key, name, QUANTITIES)
+    axes.set_xlabel(QUANTITIES[across])
+    axes.set_ylabel(QUANTITIES[up])
+    axes.grid(color="0.9", linewidth=0.6)
+    points = _coordinates(branch, (across, up))
+    gaps = _gaps(branch, (across, up))
+    controls = () if style else branch.scene.analysis.stability
+    words = _words(branch, controls)
+    drawn = style or PLAIN
+    _draw_lines(axes, _segments(points, words, gaps), (lambda w: drawn) if style else _style)
+    if dots or (dots is None and len(points) <= _DOTS):
+        for point, word in zip(points, words, strict=True):
+            axes.plot(*point, ".", color=(style or _style(word)).color, markersize=6 if len(points) < 3 else 4, zorder=3)
+    if not style:
+        _draw_azimuthal(axes, branch, points, gaps)
+    _draw_jumps(axes, branch, (across, up))
+    if special_points:
+        _draw_special_points(axes, branch, (across, up))
+    if branch.status is not Status.CONVERGED and len(points):
+        axes.plot(*points[-1], "X", color=_RED, markeredgecolor="white", markersize=10, zorder=5, label=f"ends here: {branch.status}")
 
 
-def _legend(axes: Axes, branch: Branch) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        heading = "among axisymmetric shapes:" if branch.scene.analysis.stability else None
-        look: dict[str, Any] = {"fontsize": 9, "title_fontsize": 9, "framealpha": 0.9, "edgecolor": "none", "handlelength": 3.2}
-        legend = axes.legend(handles, labels, title=heading, **look)
-        legend.set_alignment("left")
+def _words(branch: Branch, controls: Sequence[str]) -> list[dict[Any, str]]:
+    """The verdicts of each equilibrium under the controls asked for."""
+    words: list[dict[Any, str]] = [
+        {c: _ILL_POSED if e.status is Status.LEGENDRE_FAILURE else e.verdict(c).word for c in controls} for e in branch
+    ]
+    if branch.status is Status.LEGENDRE_FAILURE:  # a cross marks that one
+        words[-1] = words[max(len(words) - 2, 0)]
+    return words
 
 
-# --- pressure against volume
+def verdict_style(equilibrium: Equilibrium, controls: Sequence[str] = ("pressure", "volume")) -> Style:
+    """How an equilibrium is drawn for its verdicts under some controls."""
+    return _style({c: equilibrium.verdict(c).word for c in controls})
 
 
-def _style(equilibrium: Equilibrium) -> Style:
-    """The class of an equilibrium under the controls that its scene asks for."""
-    controls = equilibrium.scene.analysis.stability
-    words = {c: verdict_text(equilibrium.verdict(c)) for c in controls}
-    if not controls:
+def _style(words: Mapping[str, str]) -> Style:
+    """The style of a class of equilibria: the verdict under each control asked for."""
+    if not words:
         return PLAIN
+    if _ILL_POSED in words.values():
+        return ILL_POSED
     if "marginal" in words.values():
         return MARGINAL
-    if len(controls) == 1:
-        return (STABLE_UNDER if words[controls[0]] == "stable" else UNSTABLE_UNDER)[controls[0]]
+    if len(words) == 1:
+        ((control, word),) = words.items()
+        return (STABLE_UNDER if word == "stable" else UNSTABLE_UNDER)[control]
     return UNSTABLE if words["volume"] == "unstable" else BOTH if words["pressure"] == "stable" else VOLUME_ONLY
 
 
-def _breaks(points: Array, special: Array) -> Array:
-    """For each pair of neighbouring points the place between them where a style changes: a special point, or half-way.
+def _coordinates(items: Sequence[Equilibrium | SpecialPoint], quantities: Sequence[str]) -> Array:
+    return np.array([[getattr(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
 
-    A special point lies between the two neighbours for which the way over it is the smallest detour, lengths taken in the picture; one
-    that is far from the points shown (of another part of the branch) lies between none.
+
+#: the special points between two neighbouring equilibria, in order: their kinds and their places in the picture; a snap is the last
+_Gap = list[tuple[str, Array]]
+_SNAP = "snap"
+
+
+def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
+    """What lies between each pair of neighbours.
+
+    A special point lies between the two neighbours for which the way over it is the smallest detour, in volume, pressure and pole height
+    together (in a picture of two of them the branch may cross itself); one that is far from the points shown lies between none.
     """
-    between = (points[1:] + points[:-1]) / 2
-    if len(points) < 2:
-        return between
-    scale = np.maximum(np.ptp(points, axis=0), 1e-300)
-    for place in special:
-        a, b, p = points[:-1] / scale, points[1:] / scale, place / scale
-        direct = np.linalg.norm(b - a, axis=1)
-        detour = np.linalg.norm(p - a, axis=1) + np.linalg.norm(p - b, axis=1) - direct
-        nearest = int(np.argmin(detour))
-        if detour[nearest] < direct[nearest]:
-            between[nearest] = place
-    return between
+    points, special = _coordinates(branch, tuple(QUANTITIES)), list(branch.special_points or ())
+    scale = np.maximum(np.ptp(points, axis=0), 1e-300) if len(points) else 1.0
+    a, b = points[:-1] / scale, points[1:] / scale
+    direct = np.linalg.norm(b - a, axis=1)
+    inside: list[list[tuple[float, str, Array]]] = [[] for _ in direct]
+    places, pictured = _coordinates(special, tuple(QUANTITIES)) / scale, _coordinates(special, quantities)
+    for item, place, drawn in zip(special, places, pictured, strict=True):
+        detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
+        if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
+            inside[k].append((float((place - a[k]) @ (b[k] - a[k])), str(item.kind), drawn))
+    ordered = [[(kind, drawn) for _, kind, drawn in sorted(gap, key=lambda item: item[0])] for gap in inside]
+    for jump in branch.jumps:
+        for k, (before, landing) in enumerate(pairwise(branch)):
+            if landing is jump.landing:  # by way of the fold where the branch turned back
+                ordered[k] = [(_SNAP, _coordinates([jump.limit or before], quantities)[0])]
+    return ordered
 
 
-def _runs(classes: Sequence[Any]) -> Iterator[tuple[int, int]]:
-    """First and last index of each run of equal neighbours."""
-    first = 0
-    for k in range(1, len(classes) + 1):
-        if k == len(classes) or classes[k] != classes[first]:
-            yield first, k - 1
-            first = k
+@dataclass(frozen=True, eq=False)
+class _Segment:
+    """A straight piece of the drawn line, and the verdicts along it."""
+
+    a: Array
+    b: Array
+    words: dict[Any, str]
 
 
-def _stretch(points: Array, breaks: Array, first: int, last: int) -> Array:
-    """The line through points first to last, prolonged to the places where its neighbours begin: no gap, no overlap."""
-    before = breaks[first - 1 : first] if first > 0 else breaks[:0]
-    after = breaks[last : last + 1]
-    return np.concatenate([before, points[first : last + 1], after])
+def _segments(points: Array, words: Sequence[dict[Any, str]], gaps: Sequence[_Gap]) -> list[_Segment | None]:
+    """The pieces of the line, through the special points; None where the membrane snaps."""
+    pieces: list[_Segment | None] = []
+    for k, gap in enumerate(gaps):
+        at, now, after, end = points[k], words[k], words[k + 1], points[k + 1]
+        for kind, place in gap:
+            pieces.append(_Segment(at, place, now))
+            at, now = place, {c: after[c] if c in _CHANGES.get(kind, (c,)) else word for c, word in now.items()}
+        if gap and gap[-1][0] == _SNAP:
+            pieces.append(None)
+            continue
+        if now != after:  # somewhere here
+            pieces.append(_Segment(at, (at + end) / 2, now))
+            at = (at + end) / 2
+        pieces.append(_Segment(at, end, after))
+    return pieces
 
 
-def _draw_runs(axes: Axes, points: Array, styles: Sequence[Style], breaks: Array) -> None:
-    named: set[str] = set()
-    for first, last in _runs(styles):
-        style, line = styles[first], _stretch(points, breaks, first, last)
-        label = style.label if style.label not in named else ""
-        named.add(style.label)
+def _lines(pieces: Sequence[_Segment | None], classify: Callable[[dict[Any, str]], Any]) -> Iterator[tuple[Any, Array]]:
+    """The pieces of one class that follow each other, as lines: no gap, no overlap."""
+    kind: Any = None
+    line: list[Array] = []
+    for piece in [*pieces, None]:
+        new = None if piece is None else classify(piece.words)
+        if line and (piece is None or new != kind):
+            yield kind, np.array(line)
+            line = []
+        if piece is not None:
+            line = [*(line or [piece.a]), piece.b]
+        kind = new
+
+
+def _draw_lines(axes: Axes, pieces: Sequence[_Segment | None], classify: Callable[[dict[Any, str]], Style]) -> None:
+    for style, line in _lines(pieces, classify):
         # the caps of neighbouring dashes may not run into each other
         look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
-        axes.plot(*line.T, label=label or None, zorder=3, **look)
-        # what was computed, as against the straight lines between
-        computed = points[first : last + 1]
-        if len(points) <= _DOTS:
-            axes.plot(*computed.T, ".", color=style.color, markersize=6 if len(points) < 3 else 4, zorder=3)
+        axes.plot(*line.T, label=_new(axes, style.label), zorder=3, **look)
 
 
-def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, breaks: Array) -> None:
+def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
     """A grey band behind the stretches that lose stability to an azimuthal mode."""
-    modes = branch.scene.analysis.azimuthal_modes
-    if not modes:
-        return
-    unstable = [tuple(n for n in modes if verdict_text(e.verdict(azimuthal=n)) == "unstable") for e in branch]
-    named: set[tuple[int, ...]] = set()
-    for first, last in _runs(unstable):
-        lost = unstable[first]
+    words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
+    for lost, line in _lines(_segments(points, words, gaps), lambda w: tuple(n for n, word in w.items() if word == "unstable")):
         if lost:
-            label = "unstable to azimuthal n = " + ", ".join(map(str, lost)) if lost not in named else None
-            named.add(lost)
-            axes.plot(*_stretch(points, breaks, first, last).T, color="0.82", linewidth=8, solid_capstyle="butt", zorder=1, label=label)
+            label = _new(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
+            axes.plot(*line.T, color="0.82", linewidth=8, solid_capstyle="butt", zorder=1, label=label)
 
 
-def _draw_special_points(axes: Axes, branch: Branch) -> None:
-    points = branch.special_points or ()
+def _draw_jumps(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
+    """An arrow for each snap, from the fold where the branch turned back, or from the equilibrium before."""
+    before = {id(landing): previous for previous, landing in pairwise(branch)}
+    arrow = {"arrowstyle": "-|>", "color": _RED, "linewidth": 1.6, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0}
+    for jump in branch.jumps:
+        if id(jump.landing) in before:
+            tail, tip = _coordinates([jump.limit or before[id(jump.landing)], jump.landing], quantities)
+            axes.annotate("", xy=tip, xytext=tail, arrowprops=arrow, zorder=4)
+            axes.plot([], [], color=_RED, linewidth=1.6, label=_new(axes, "snap"))
+
+
+def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
+    points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit)]
     for kind in dict.fromkeys(str(p.kind) for p in points):
         marker, label = MARKERS.get(kind, ("X", kind.replace("_", " ")))
-        places = np.array([[p.volume, p.pressure] for p in points if str(p.kind) == kind])
+        places = _coordinates([p for p in points if str(p.kind) == kind], quantities)
         look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
-        axes.plot(*places.T, marker, label=label, zorder=4, **look)
+        axes.plot(*places.T, marker, label=_new(axes, label), zorder=4, **look)
+
+
+def _new(axes: Axes, label: str) -> str | None:
+    """A label, unless the legend has it already."""
+    return label if label and label not in axes.get_legend_handles_labels()[1] else None
 
 
 # --- meridians
 
 
-def _draw_meridians(axes: Axes, shown: Sequence[Equilibrium]) -> None:
-    from matplotlib import colormaps
+def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style) -> None:
+    """The deformed meridian, both halves, under the style's label."""
+    profile = smooth_profile(equilibrium, points=_CURVE)
+    rho, eta = profile["rho"], profile["eta"]
+    look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
+    axes.plot(np.concatenate([-rho[::-1], rho]), np.concatenate([eta[::-1], eta]), label=style.label or None, **look)
 
-    # lightness falls along the map, so that neighbours differ in grey as well
-    colors = colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2)))
-    for equilibrium, color in zip(shown, colors, strict=False):
-        profile = smooth_profile(equilibrium, points=_CURVE)
-        rho, eta = profile["rho"], profile["eta"]
-        label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
-        axes.plot(np.concatenate([-rho[::-1], rho]), np.concatenate([eta[::-1], eta]), color=color, linewidth=1.8, label=label)
+
+def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium]) -> None:
+    """What drawn meridians stand in: labelled axes of equal scale, the clamped rim, and the magnetic sources of their scene."""
+    axes.set_xlabel(RADIUS_LABEL)
+    axes.set_ylabel("height η/R₀")
+    axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(nbins=6)
+    axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
     axes.plot([-1, 1], [0, 0], "s", color="black", markersize=5, zorder=5)
+    _draw_sources(axes, shown)
 
 
-def _draw_sources(axes: Axes, branch: Branch, shown: Sequence[Equilibrium]) -> None:
+def _draw_sources(axes: Axes, shown: Sequence[Equilibrium]) -> None:
     """Sources on the axis as arrows along their moments; one further away than the picture is wide is named, not drawn."""
     eta = np.concatenate([e.profile()["eta"] for e in shown])
     rho = max(float(np.max(e.profile()["rho"])) for e in shown)
     extent = max(float(np.ptp(eta)), 2 * rho)
-    for source in branch.scene.sources:
+    for source in shown[0].scene.sources:
         height = getattr(source, "height", None)
         if height is None:
             continue

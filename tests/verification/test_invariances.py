@@ -115,6 +115,17 @@ def test_flat_limit_from_cold(material):
         assert again.volume == pytest.approx(volume, rel=1e-6)
 
 
+@pytest.mark.parametrize("control", ["pressure", "volume"])
+@pytest.mark.parametrize("volume", [1e-9, 1e-8, 1e-6, 1e-5])
+def test_flat_limit_of_the_eigenvalues(volume, control):
+    """lambda ~ V^2: the transverse stiffness is the tension. The constant is that at V = 1e-4, where nothing is near round-off."""
+    scene = disc_scene(elements=16)
+    small, reference = (fm.equilibrium(scene, volume=v, solver="newton") for v in (volume, 1e-4))
+    assert small.verdict(control).stable is True
+    expected = reference.verdict(control).smallest_eigenvalue * (volume / 1e-4) ** 2
+    assert small.verdict(control).smallest_eigenvalue == pytest.approx(expected, rel=1e-4)
+
+
 def test_splitting_a_source_changes_nothing():
     """Two dipoles at one place add as fields: (sqrt(a) + sqrt(b))^2 = M."""
     strength, height = 200.0, 6.5

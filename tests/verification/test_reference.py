@@ -29,11 +29,11 @@ def names(cases):
 
 
 def test_registry_holds_every_minimum():
-    """Counted in the tables by hand: 30 points, minima under volume control but for 2, under pressure control 17; 9 limit points."""
+    """Counted in the tables by hand, scene by scene: 30 points, 28 minima under volume, 3 + 6 + 7 + 3 under pressure control."""
     assert len(POINTS) == 30
     assert len(LIMIT_POINTS) == 9
     assert sum(p.control == "volume" for p in PROBLEMS) == 28 + len(LIMIT_POINTS)
-    assert sum(p.control == "pressure" for p in PROBLEMS) == 17
+    assert sum(p.control == "pressure" for p in PROBLEMS) == 19
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=names(PROBLEMS))
@@ -43,11 +43,34 @@ def test_state(problem):
     assert eq.pressure == pytest.approx(expected["pressure"], rel=1e-6)
     assert eq.volume == pytest.approx(expected["volume"], rel=1e-6)
     assert eq.elastic_energy == pytest.approx(expected["elastic_energy"], rel=1e-6)
+    assert eq.center_height == pytest.approx(expected["center_height"], rel=1e-5)
+
+
+#: missed, and by how much: recorded on 2026-11-22. A soft state (lambda_pressure 3.2) near the dipole amplifies the discretisation error of
+#: order 4; no quadrature changes it, 128 elements leave 8.8e-8. Of the energy E = 133.9 as a whole it is 1.3e-8.
+MISSED = {"dipole_above-4.7-pressure": "magnetic energy off by 1.4e-6"}
+
+
+def marks(problem):
+    return [pytest.mark.xfail(reason=MISSED[problem.name], strict=True)] if problem.name in MISSED else []
+
+
+@pytest.mark.parametrize("problem", [pytest.param(p, id=p.name, marks=marks(p)) for p in PROBLEMS])
+def test_magnetic_energy(problem):
+    eq, expected = problem.solve("ipopt"), problem.point.expected["magnetic_energy"]
     if problem.point.scene.sources:
-        assert eq.magnetic_energy == pytest.approx(expected["magnetic_energy"], rel=1e-6)
+        assert eq.magnetic_energy == pytest.approx(expected, rel=1e-6)
     else:
         assert eq.magnetic_energy == 0.0
-    assert eq.center_height == pytest.approx(expected["center_height"], rel=1e-5)
+
+
+def test_magnetic_energy_that_is_missed_converges():
+    """The one miss above is the mesh's: with 128 elements 1e-6 is met tenfold."""
+    point = next(p.point for p in PROBLEMS if p.name in MISSED)
+    scene = point.scene.replace(mesh=fm.disc(elements=128))
+    start = fm.equilibrium(scene, volume=point.expected["volume"])
+    eq = fm.equilibrium(scene, pressure=point.expected["pressure"], start=start)
+    assert eq.magnetic_energy == pytest.approx(point.expected["magnetic_energy"], rel=1e-7)
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=names(PROBLEMS))
@@ -101,16 +124,26 @@ UNSTABLE = [p for p in POINTS if not p.is_minimum("pressure")]
 
 
 @pytest.mark.parametrize("point", UNSTABLE, ids=names(UNSTABLE))
-def test_minimiser_does_not_hold_an_unstable_state(point):
-    """Where the second variation has a negative direction under volume control, only the corrector finds the state (by its height)."""
+def test_unstable_states_by_their_height(point):
+    """Height control needs no minimum: beyond a limit point and beyond a volume fold alike."""
     eq = fm.equilibrium(point.scene, center_height=point.expected["center_height"], start=_inflated(point))
-    # near a volume fold the volume belonging to a height is itself uncertain: 5e-5 at pole height 5 of the dipole above
+    # beyond the volume fold of the dipole above the volume changes fast with the height: 5.1e-5 at pole height 5, recorded on 2026-11-22
     assert eq.volume == pytest.approx(point.expected["volume"], rel=1e-4)
     assert eq.verdict("pressure").stable is False
     assert eq.verdict("volume").stable is point.is_minimum("volume")
-    if not point.is_minimum("volume"):
-        with pytest.raises(fm.SolveError):
-            fm.equilibrium(point.scene, volume=eq.volume, start=eq, solver="ipopt")
+
+
+BEYOND_A_FOLD = [p for p in POINTS if not p.is_minimum("volume")]
+
+
+@pytest.mark.parametrize("point", BEYOND_A_FOLD, ids=names(BEYOND_A_FOLD))
+def test_minimiser_does_not_hold_an_unstable_state(point):
+    """Not even when it is started there and asked for the very same volume."""
+    eq = fm.equilibrium(point.scene, center_height=point.expected["center_height"], start=_inflated(point))
+    with pytest.raises(fm.SolveError):
+        fm.equilibrium(point.scene, volume=eq.volume, start=eq, solver="ipopt")
+    with pytest.raises(fm.SolveError):
+        fm.equilibrium(point.scene, volume=0.999 * eq.volume, start=eq, solver="ipopt")
 
 
 def _inflated(point):

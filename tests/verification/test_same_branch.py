@@ -6,7 +6,7 @@ dipole with 32 and 64 elements and found the branch with 128: the answer may not
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ HEIGHT = -3.75
 VOLUMES = np.linspace(6.28, -0.25, 20)
 
 
-@lru_cache(maxsize=None)
+@cache
 def deflated(elements: int, solver: str = "newton") -> fm.Branch:
     return fm.inflate(disc_scene(dipole=(400.0, HEIGHT), elements=elements), volumes=VOLUMES, solver=solver)
 

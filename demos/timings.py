@@ -1,0 +1,114 @@
+"""What a run costs: the 60-step inflation under a dipole, its set-up, and how both grow with the mesh.
+
+Prints one table. Times are medians of repeated runs in one process, after imports; on a shared machine they scatter by tens of per cent,
+so compare rows with each other rather than with numbers from elsewhere.
+
+    python demos/timings.py            all tables, about a minute
+    python demos/timings.py --quick    one repetition on small meshes
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+import femmembrane as fm
+from femmembrane.potential import Potential
+from femmembrane.solve.controls import VolumeControl
+from femmembrane.solve.newton import correct
+from femmembrane.solve.start import spherical_dome
+
+OGDEN = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
+BOTH = ("pressure", "volume")
+
+
+def scene(elements: int, degree: int = 2, stability: Sequence[str] = ()) -> fm.Scene:
+    """The three-term Ogden membrane under a dipole of strength 200 at height 6.5."""
+    return fm.Scene(
+        material=OGDEN,
+        sources=[fm.Dipole(strength=200, height=6.5)],
+        susceptibility=2.5,
+        mesh=fm.disc(elements=elements),
+        degree=degree,
+        analysis=fm.Analysis(stability=tuple(stability)),
+    )
+
+
+def seconds(work: Callable[[], object], repeat: int) -> float:
+    """Median wall time of repeated calls."""
+    times = []
+    for _ in range(repeat):
+        clock = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - clock)
+    return statistics.median(times)
+
+
+def run_table(repeat: int) -> dict[str, float]:
+    """60 volumes from 0.5 to 75 on 64 quadratic elements."""
+    volumes = np.linspace(0.5, 75, 60)
+    rows = {
+        "IPOPT, both verdicts": seconds(lambda: fm.inflate(scene(64, stability=BOTH), volumes=volumes), repeat),
+        "IPOPT, no verdict": seconds(lambda: fm.inflate(scene(64), volumes=volumes), repeat),
+        "Newton, both verdicts": seconds(lambda: fm.inflate(scene(64, stability=BOTH), volumes=volumes, solver="newton"), repeat),
+        "Newton, no verdict": seconds(lambda: fm.inflate(scene(64), volumes=volumes, solver="newton"), repeat),
+    }
+    print(f"\n60 equilibria, V = 0.5 to 75, 64 quadratic elements        {'s':>8} {'ms each':>8}")
+    for name, t in rows.items():
+        print(f"  {name:<54} {t:>10.3f} {t / 60 * 1e3:>8.2f}")
+    return rows
+
+
+def trace_table(repeat: int) -> None:
+    """The same branch by arc length, and its error in P against a finer mesh at the same volume."""
+    exact = fm.equilibrium(scene(64, 6), volume=75.4, solver="newton").pressure
+    print(f"\nTraced by arc length, V = 0.35 to 75.4                {'points':>8} {'ms each':>8} {'+verdicts':>9} {'error in P':>11}")
+    for elements, degree in ((32, 2), (64, 2), (8, 6), (16, 4)):
+        plain, judged = scene(elements, degree), scene(elements, degree, BOTH)
+        branch = fm.trace(plain, start=0.35, until={"volume": 75.4}, special_points=False)
+        n = len(branch)
+        t = seconds(lambda s=plain: fm.trace(s, start=0.35, until={"volume": 75.4}, special_points=False), repeat)
+        v = seconds(lambda s=judged: fm.trace(s, start=0.35, until={"volume": 75.4}, special_points=False), repeat)
+        error = abs(branch[-1].pressure / exact - 1)
+        print(f"  {elements:>4} elements of degree {degree:<28} {n:>8} {t / n * 1e3:>8.2f} {v / n * 1e3:>9.2f} {error:>11.1e}")
+
+
+def growth_table(sizes: Sequence[int], repeat: int) -> list[tuple[int, float, float]]:
+    """Set-up and one equilibrium from a dome against the number of quadratic elements."""
+    print(f"\nGrowth with the mesh (quadratic elements)                    {'set-up s':>10} {'one solve s':>12}")
+    rows = []
+    for elements in sizes:
+        asked = scene(elements)
+        setup = seconds(lambda s=asked: Potential(s).evaluate(np.zeros(Potential(s).space.n_free), 0.0), repeat)
+        potential = Potential(asked)
+        dome = spherical_dome(potential, 2.0)
+        solve = seconds(lambda p=potential, x=dome: correct(p, VolumeControl(2.0), x, 1.9, damped=True, max_iterations=30), repeat)
+        print(f"  {elements:>8} elements {setup:>50.3f} {solve:>12.3f}")
+        rows.append((elements, setup, solve))
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="one repetition on small meshes")
+    parser.add_argument("--out", help="not used: this demo only prints")
+    quick = parser.parse_args(arguments).quick
+    repeat = 1 if quick else 5
+    print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}")
+    fm.inflate(scene(16, stability=BOTH), volumes=[0.5, 1.0])  # imports and first-call costs are not counted
+    run_table(repeat)
+    trace_table(repeat)
+    rows = growth_table((100, 1_000) if quick else (1_000, 10_000, 100_000), repeat if quick else 1)
+    # time per element does not grow: linear within the noise of a shared machine, which a factor of 5 allows for
+    per_element = [(setup + solve) / n for n, setup, solve in rows]
+    assert per_element[-1] < 5 * per_element[0], per_element
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

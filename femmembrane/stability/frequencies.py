@@ -1,0 +1,132 @@
+"""Natural frequencies: small oscillations of the membrane about an equilibrium.
+
+A perturbation phi exp(s t) obeys s^2 M phi = -K phi, with K the second variation and M the mass of the reference area, so that the
+eigenvalues lambda of a verdict are squared frequencies. Each gives a pair of roots s = +- sqrt(-lambda)::
+
+    lambda > 0     s = +- i omega             oscillation, omega = sqrt(lambda)
+    lambda < 0     s = +- growth_rate         departure, growth_rate = sqrt(-lambda)
+
+The gas has no inertia of its own here, and there is no damping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..potential import Array, Potential
+from ..solve.banded import band_product
+from .azimuthal import AzimuthalOperator, _compression, azimuthal_operator, azimuthal_shape, lowest_eigenvalues
+from .spectrum import SpectrumError, _Pencil
+from .verdict import compressed
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """One natural mode of an equilibrium.
+
+    Attributes
+    ----------
+    eigenvalue : float
+        lambda of K phi = lambda M phi, in units of mu/(rho_m R0^2) with rho_m the mass density.
+    error : float
+        Bound on the algebraic error of the eigenvalue.
+    azimuthal : int
+        Number of waves around the axis.
+    control : str or None
+        "pressure" or "volume", what is held during the motion; None for azimuthal modes, which do not change the volume.
+    coefficients : ndarray
+        Of the mode on the free degrees of freedom, normalised in the mass of the reference area, the largest one positive.
+    """
+
+    eigenvalue: float
+    error: float
+    azimuthal: int
+    control: str | None
+    coefficients: Array = field(repr=False)
+    _shape: Callable[[Array], Mapping[str, Array]] = field(repr=False)
+
+    @property
+    def omega(self) -> float:
+        """Angular frequency in units of sqrt(mu/(rho_m R0^2)), the imaginary part of s: 0 in an unstable direction, which departs."""
+        return float(np.sqrt(max(self.eigenvalue, 0.0)))
+
+    @property
+    def growth_rate(self) -> float:
+        """Rate of departure in the units of omega, the real part of s: 0 where the membrane oscillates."""
+        return float(np.sqrt(max(-self.eigenvalue, 0.0)))
+
+    @property
+    def stable(self) -> bool | None:
+        """None when the eigenvalue is zero within its error."""
+        return None if abs(self.eigenvalue) <= self.error else self.eigenvalue > 0
+
+    @property
+    def mode(self) -> Mapping[str, Array]:
+        """The shape at the nodes: r (reference radius), u, w, and c around the axis for azimuthal modes.
+
+        The displacement at the angle theta is (u cos(n theta), c sin(n theta), w cos(n theta)) in (e_rho, e_theta, e_z).
+        """
+        return self._shape(self.coefficients)
+
+
+def natural_frequencies(
+    potential: Potential, x: Array, pressure: float, n: int = 0, count: int = 3, control: str = "pressure"
+) -> tuple[Vibration, ...]:
+    """The lowest modes with n waves around the axis in order of their eigenvalues, proved by inertia to be the lowest.
+
+    Parameters
+    ----------
+    potential : Potential
+    x : ndarray, shape (n_free,)
+        Displacement coefficients of the equilibrium.
+    pressure : float
+    n : int
+        Number of waves around the axis; 0 for axisymmetric modes.
+    count : int
+        How many modes, each counted with its multiplicity; for n >= 1 a mode and itself turned by a quarter wave count as one.
+    control : {"pressure", "volume"}
+        What is held during the motion. Makes a difference for n = 0 only.
+
+    Raises
+    ------
+    InputError
+        For a number of waves, a count or a control that is not allowed.
+    SolveError
+        Where a stress is compressive, so that ever shorter waves have ever lower eigenvalues and none is the lowest; or when the modes
+        found cannot be proved to be the lowest.
+    """
+    operator = azimuthal_operator(potential, x, pressure, n)
+    evaluation = potential.evaluate(x, pressure)
+    where = _short_waves(operator, compressed(potential, evaluation))
+    if where:
+        raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=Status.LEGENDRE_FAILURE)
+    try:
+        found = lowest_eigenvalues(potential, x, pressure, n, count, control)
+    except SpectrumError as error:
+        raise SolveError(f"no natural frequencies: {error}", status=Status.NOT_CONVERGED) from error
+    constraint = evaluation.volume_gradient if n == 0 and control == "volume" else None
+    pencil = _Pencil(operator.band, operator.mass, operator.half_bandwidth, constraint, 0.0)
+    shape = partial(_shape_at_nodes, potential, operator.n)
+    vibrations = []
+    for _, mode in found:
+        value, error_bound = pencil.quotient(mode, band_product(operator.mass, operator.half_bandwidth, mode))
+        mode.flags.writeable = False
+        vibrations.append(Vibration(value, error_bound, operator.n, None if n else control, mode, shape))
+    return tuple(vibrations)
+
+
+def _short_waves(operator: AzimuthalOperator, meridional: tuple[float, float] | None) -> str:
+    """Where the Legendre-Hadamard condition fails; a hoop stress sets no axisymmetric wave in motion."""
+    if operator.n:
+        return _compression(operator)
+    return "" if meridional is None else f"meridional stress compressive at r in [{meridional[0]:.3g}, {meridional[1]:.3g}]"
+
+
+def _shape_at_nodes(potential: Potential, n: int, mode: Array) -> dict[str, Array]:
+    shape = azimuthal_shape(potential.space, n, mode)
+    return {key: values for key, values in shape.items() if n or key != "c"}

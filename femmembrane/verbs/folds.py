@@ -1,0 +1,361 @@
+"""Folds followed while a number of the scene changes: where limit points and volume folds move, appear and vanish."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, SolveError, Status, unknown_name
+from ..potential import Family
+from ..results.records import Equilibrium, SpecialPoint
+from ..scene import Scene
+from ..solve.continuation import StepControl
+from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
+from ..solve.parameter import Parameter
+from ..solve.state import State
+from ..stability.verdict import compressed
+from ..threads import one_thread
+from .recording import record
+from .trace import CONTACT
+
+Array = NDArray[np.float64]
+
+#: rate of the fold's own quantity along the curve below which it counts as stationary too: two folds of this kind merge there
+_STATIONARY = 1e-6
+#: shorter steps than the corrector needs, so that a line through the points is a fair picture of the curve
+_STEPS = StepControl(largest=0.1)
+
+_FOLD_NAMES = {"limit_point": "limit point (dP = 0)", "volume_fold": "volume fold (dV = 0)"}
+_LABELS = (
+    (r"source\.(\d+)\.strength", "dipole strength M = μ₀D²/(R₀⁶μ)"),
+    (r"source\.(\d+)\.height", "height of the source h/R₀"),
+    (r"membrane\.susceptibility", "susceptibility χ"),
+    (r"material\.mu\.(\d+)", "modulus of term {0} over the shear modulus, μ{0}/μ"),
+    (r"material\.alpha\.(\d+)", "exponent of term {0}, α{0}"),  # noqa: RUF001
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Cusp(SpecialPoint):
+    """A point of a fold curve where the number is stationary along the curve, solved as an equation.
+
+    Attributes
+    ----------
+    kind : str
+        ``cusp``: two folds of the kind followed merge; on one side of ``value`` there are both, on the other none. ``branch_point``: a
+        limit point meets a volume fold, and branches of equilibria meet or separate.
+    value : float
+        The number there; its error is of second order in ``error``.
+    """
+
+    value: float = field(kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class FoldCurve:
+    """A fold followed in one number of the scene.
+
+    Attributes
+    ----------
+    kind : str
+        limit_point (dP = 0) or volume_fold (dV = 0).
+    parameter : str
+        Name of the number, as given.
+    values, pressure, volume, center_height : ndarray, shape (len(curve),)
+        The number, and the fold at it, in the order of the curve.
+    cusps : tuple of Cusp
+        Where the curve turns in the number.
+    equilibria : tuple of Equilibrium
+        The folds as equilibria, each of its own scene.
+    closed : bool
+        Whether the curve came back to its first point, which is then also the last.
+    status : Status
+        How the curve ended; with a ``message`` unless a bound was met or the curve closed.
+    timings : mapping of str to float
+        Seconds by stage.
+    """
+
+    kind: str
+    parameter: str
+    values: Array
+    pressure: Array
+    volume: Array
+    center_height: Array
+    cusps: tuple[Cusp, ...]
+    equilibria: tuple[Equilibrium, ...] = field(repr=False)
+    closed: bool = False
+    status: Status = Status.CONVERGED
+    message: str = ""
+    timings: Mapping[str, float] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.equilibria)
+
+    def __str__(self) -> str:
+        width = max(14, len(self.parameter))
+        lines = [_FOLD_NAMES[self.kind], f"{self.parameter:>{width}} {'pressure':>14} {'volume':>14} {'pole height':>14}"]
+        rows = zip(self.values, self.pressure, self.volume, self.center_height, strict=True)
+        lines += [f"{m:>{width}.8g} {p:>14.9g} {v:>14.9g} {w:>14.9g}" for m, p, v, w in rows]
+        for c in self.cusps:
+            lines.append(f"{c.kind.replace('_', ' ')} at {self.parameter} = {c.value:.10g}: P = {c.pressure:.9g}, V = {c.volume:.9g}")
+        return "\n".join(lines + ([self.message] if self.message else []))
+
+    def to_dataframe(self) -> Any:
+        """The curve as a pandas DataFrame: a column named like the parameter, then pressure, volume and center_height."""
+        import pandas
+
+        return pandas.DataFrame(
+            {self.parameter: self.values, "pressure": self.pressure, "volume": self.volume, "center_height": self.center_height}
+        )
+
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Pressure and volume of the fold against the number as a Matplotlib figure, also written to ``path`` if given."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from ..results.store import replace_file
+
+        figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+        FigureCanvasAgg(figure)
+        panels = figure.subplots(2, 1, sharex=True)
+        title = self.equilibria[0].scene.title if self.equilibria else ""
+        figure.suptitle(title.replace("$", r"\$") or _FOLD_NAMES[self.kind][0].upper() + _FOLD_NAMES[self.kind][1:], fontsize=11)
+        labels = {"pressure": "pressure at the fold P = pR₀/(μT)", "volume": "volume at the fold V/R₀³"}
+        for axes, (name, label) in zip(panels, labels.items(), strict=True):
+            self._draw(axes, name)
+            axes.set_ylabel(label)
+        panels[-1].set_xlabel(_label(self.parameter))
+        panels[0].legend(fontsize=9, framealpha=0.9, edgecolor="none")
+        if path is not None:
+            with replace_file(path) as temporary:
+                figure.savefig(temporary, dpi=160)
+        return figure
+
+    def _draw(self, axes: Any, name: str) -> None:
+        axes.plot(self.values, getattr(self, name), "-", color="#0072b2", linewidth=1.8, zorder=2, label=_FOLD_NAMES[self.kind])
+        axes.plot(self.values, getattr(self, name), ".", color="#0072b2", markersize=4, zorder=2)
+        markers = {"cusp": ("D", "cusp: two of them merge"), "branch_point": ("s", "branch point: limit point meets volume fold")}
+        for kind, (marker, label) in markers.items():
+            places = np.array([[c.value, getattr(c, name)] for c in self.cusps if c.kind == kind]).reshape(-1, 2)
+            if len(places):
+                look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "zorder": 3}
+                axes.plot(*places.T, marker, label=label, **look)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(color="0.9", linewidth=0.6)
+
+
+@one_thread
+def fold_curve(
+    scene: Scene,
+    *,
+    start: SpecialPoint,
+    parameter: str,
+    bounds: tuple[float, float],
+    direction: int = 1,
+    max_steps: int = 400,
+    steps: StepControl | None = None,
+    ill_posed: str = "stop",
+    throw: bool = True,
+) -> FoldCurve:
+    """Follow a limit point or a volume fold while a number of the scene changes.
+
+    The curve is followed by arc length in displacement, pressure and number (the number in units of the width of ``bounds``), so that it
+    passes the points where two folds merge and comes back on the other one.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene of ``start``.
+    start : SpecialPoint
+        Of kind limit_point or volume_fold, from :func:`femmembrane.trace`.
+    parameter : str
+        ``source.K.strength``, ``source.K.height`` (K from 0), ``membrane.susceptibility``, or a number of the material. For Ogden's:
+        ``material.mu.K``, where the other moduli are scaled by one factor, and ``material.alpha.K``, where mu_K alpha_K stays, so that
+        the sum of mu alpha stays 2.
+    bounds : (float, float)
+        Smallest and largest value; the last point lies exactly on the bound that is met.
+    direction : {1, -1}
+        1 sets out towards larger values.
+    max_steps : int
+    steps : StepControl, optional
+        Lengths and accuracy of the steps; default those of a trace, but none longer than 0.1.
+    ill_posed : {"stop", "mark"}
+        What to do where the meridional stress is compressive, as for :func:`femmembrane.trace`.
+    throw : bool
+        Raise when the curve ends before a bound is met; otherwise return it with its status and message.
+
+    Returns
+    -------
+    FoldCurve
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter carries the curve up to the failure as ``result``.
+    """
+    named = Parameter(scene, parameter)
+    low, high = _bounds(named, bounds, direction)
+    if ill_posed not in ("stop", "mark"):
+        raise unknown_name("ill_posed", str(ill_posed), ("stop", "mark"))
+    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
+        raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
+    clock = time.perf_counter()
+    family = Family(scene, named.vary)
+    _check_start(start, family)
+    system = FoldSystem(family, start.kind, high - low)
+    point = first_fold(system, start.equilibrium.state, start.pressure, named.value, direction)
+    following = _Following(system, named, (low, high), [], [], {"setup": time.perf_counter() - clock, "solve": 0.0, "cusps": 0.0})
+    following.add(point)
+    status, message, closed = following.follow(point, steps or _STEPS, int(max_steps), ill_posed)
+    curve = following.curve(status, message, closed)
+    if throw and message:
+        raise SolveError(message, status=status, result=curve)
+    return curve
+
+
+@dataclass
+class _Following:
+    """A fold curve under way."""
+
+    system: FoldSystem
+    parameter: Parameter
+    bounds: tuple[float, float]
+    found: list[Equilibrium]
+    cusps: list[Cusp]
+    timings: dict[str, float]
+
+    def follow(self, first: FoldPoint, steps: StepControl, max_steps: int, ill_posed: str) -> tuple[Status, str, bool]:
+        """Step until a bound is met or the curve closes: status, message (empty if all went well), and whether it closed."""
+        point, points = first, fold_points(self.system, first, self.bounds, steps)
+        for _ in range(max_steps):
+            clock = time.perf_counter()
+            try:
+                new = next(points)
+                self.timings["solve"] += time.perf_counter() - clock
+                clock, segment = time.perf_counter(), FoldSegment(self.system, point, new)
+                turns = segment.turns()
+                self.timings["cusps"] += time.perf_counter() - clock
+            except SolveError as error:
+                return *self._ended(error, point), False
+            if segment.passes(first):
+                self._add_cusps(t for t in turns if t[0].sigma <= segment.b.sigma)
+                self.found.append(self.found[0])
+                return Status.CONVERGED, "", True
+            beyond = [t for t, _ in turns if not self.bounds[0] <= t.number <= self.bounds[1]]
+            if beyond:
+                bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
+                new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
+            self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
+            self.add(new)
+            if new.number in self.bounds:
+                return Status.CONVERGED, "", False
+            where = compressed(self.system.family, new.evaluation)
+            if where is not None and ill_posed == "stop":
+                return Status.LEGENDRE_FAILURE, self._ill_posed(where), False
+            if self._clearance(new) < CONTACT:
+                return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at {self._place(new)}", False
+            point = new
+        return Status.STEP_LIMIT, f"{max_steps} steps were made without meeting a bound of {self.parameter.name}", False
+
+    def add(self, point: FoldPoint) -> None:
+        self.found.append(self._record(point))
+
+    def _add_cusps(self, turns: Iterable[tuple[FoldPoint, float]]) -> None:
+        for point, error in turns:
+            own = point.tangent[-2] if self.system.kind == "limit_point" else point.evaluation.volume_gradient @ point.tangent[:-2]
+            kind = "cusp" if abs(own) < _STATIONARY else "branch_point"
+            eq = self._record(point)
+            self.cusps.append(Cusp(kind, eq.volume, eq.pressure, eq.center_height, error, eq, value=point.number))
+
+    def _record(self, point: FoldPoint) -> Equilibrium:
+        scene = self.parameter.scene_at(point.number)
+        state = State(point.x, point.pressure, point.evaluation, point.iterations, point.correction, point.residual, gap=0.0)
+        return record(scene, self.system.family, state)
+
+    def _clearance(self, point: FoldPoint) -> float:
+        """Smallest distance between a node and a source."""
+        space, sources = self.system.family.space, self.parameter.scene_at(point.number).sources
+        s = space.node_parameters()
+        (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(point.x, s)
+        return min((float(np.sqrt(source.distance_squared(R + u, Z + w).min())) for source in sources), default=np.inf)
+
+    def _ended(self, error: SolveError, point: FoldPoint) -> tuple[Status, str]:
+        near = self._clearance(point)
+        if near < 50 * CONTACT:
+            return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
+        return error.status, str(error)
+
+    def _place(self, point: FoldPoint) -> str:
+        return f"{self.parameter.name} = {point.number:.6g} (V = {point.evaluation.volume:.6g}, P = {point.pressure:.6g})"
+
+    def _ill_posed(self, where: tuple[float, float]) -> str:
+        eq = self.found[-1]
+        return (
+            f"at V = {eq.volume:.6g}, P = {eq.pressure:.6g} the meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}]: "
+            "the Legendre-Hadamard condition fails there, and what a mesh finds beyond depends on the mesh"
+        )
+
+    def curve(self, status: Status, message: str, closed: bool) -> FoldCurve:
+        values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in self.found])
+        pressure, volume, height = (_frozen([getattr(eq, q) for eq in self.found]) for q in ("pressure", "volume", "center_height"))
+        return FoldCurve(
+            kind=self.system.kind,
+            parameter=self.parameter.name,
+            values=values,
+            pressure=pressure,
+            volume=volume,
+            center_height=height,
+            cusps=tuple(self.cusps),
+            equilibria=tuple(self.found),
+            closed=closed,
+            status=status,
+            message=message,
+            timings=self.timings,
+        )
+
+
+def _frozen(column: list[float]) -> Array:
+    array = np.array(column)
+    array.flags.writeable = False
+    return array
+
+
+def _bounds(parameter: Parameter, bounds: tuple[float, float], direction: int) -> tuple[float, float]:
+    if isinstance(direction, bool) or direction not in (1, -1):
+        raise InputError("direction", direction, "1 (towards larger values) or -1 is allowed")
+    try:
+        low, high = (float(b) for b in bounds)
+    except (TypeError, ValueError):
+        raise InputError("bounds", bounds, "two finite numbers, smallest and largest, are allowed") from None
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise InputError("bounds", bounds, "two finite numbers, smallest and largest, are allowed")
+    value = parameter.value
+    if not low <= value <= high or value == (high if direction == 1 else low):
+        raise InputError("bounds", bounds, f"bounds around {value:.9g} with room in direction {direction:+d} are allowed")
+    for bound in (low, high):
+        parameter.scene_at(bound)
+    return low, high
+
+
+def _check_start(start: SpecialPoint, family: Family) -> None:
+    if not isinstance(start, SpecialPoint):
+        raise InputError("start", start, "a special point is allowed, such as fm.trace(scene, ...).special_points[0]")
+    if start.kind not in KINDS:
+        raise InputError("start", start.kind, "a special point of kind " + " or ".join(KINDS) + " is allowed")
+    if start.equilibrium.state.shape != (family.space.n_free,):
+        raise InputError("start", start, f"a point with {family.space.n_free} unknowns (the same mesh and degree) is allowed")
+
+
+def _label(parameter: str) -> str:
+    for pattern, label in _LABELS:
+        match = re.fullmatch(pattern, parameter)
+        if match:
+            return label.format(*(str(int(k) + 1) if "term" in label else k for k in match.groups()))
+    return parameter

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from femmembrane.discretization.meridian import disc
-from femmembrane.errors import InputError
+from femmembrane.errors import InputError, Status
 from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
-from femmembrane.results.records import Branch, SpecialPoint
+from femmembrane.results.records import Branch, Equilibrium, Jump, SpecialPoint
 from femmembrane.scene import Analysis, Scene
 from femmembrane.stability.verdict import Verdict
 from femmembrane.verbs import inflate
@@ -245,6 +245,66 @@ def test_special_points_have_distinct_markers(branch: Branch) -> None:
     named = [line for line in figure.axes[0].lines if not line.get_label().startswith("_")]
     markers = [line.get_marker() for line in named if line.get_linestyle() == "None"]
     assert len(set(markers)) == len(kinds)
+
+
+def judged(equilibrium: Equilibrium, pressure: bool, volume: bool) -> Equilibrium:
+    """The equilibrium with verdicts made up."""
+    words = {"pressure": pressure, "volume": volume}
+    verdicts = {(c, 0): Verdict(stable, 1.0 if stable else -1.0, 1e-9, c, 0, 0, "") for c, stable in words.items()}
+    return dataclasses.replace(equilibrium, _verdicts=verdicts)
+
+
+def test_two_special_points_between_neighbours(branch: Branch) -> None:
+    """Between limit point and volume fold the membrane has lost stability under pressure control alone, computed points there or not."""
+    places = {"limit_point": (2.2, 1.92, 1.1), "volume_fold": (3.2, 1.88, 1.3)}
+    special = tuple(SpecialPoint(kind, *place, 0.0, branch[1]) for kind, place in reversed(places.items()))
+    equilibria = tuple(judged(e, k < 2, k < 2) for k, e in enumerate(branch))
+    figure = plots.plot_pressure_volume(dataclasses.replace(branch, equilibria=equilibria, special_points=special))
+    lines = {line.get_label(): line.get_xydata() for line in figure.axes[0].lines if not line.get_label().startswith("_")}
+    limit, fold = (np.array(place[:2]) for place in places.values())
+    np.testing.assert_array_equal(lines["stable under both controls"][-1], limit)
+    np.testing.assert_array_equal(lines["stable under volume control only"], [limit, fold])
+    np.testing.assert_array_equal(lines["unstable under both controls"][0], fold)
+
+
+def test_snap_is_an_arrow(branch: Branch) -> None:
+    """The line goes on to the fold where the branch turned back, and begins again where the membrane lands."""
+    limit = SpecialPoint("limit_point", 1.7, 1.9, 1.0, 0.0, branch[1])
+    snapping = dataclasses.replace(branch, jumps=(Jump(2, limit, branch[2]),))
+    (axes,) = plots.plot_pressure_volume(snapping).axes
+    lines = [
+        line.get_xydata() for line in axes.lines if line.get_label() in ("stable under both controls", "stable under volume control only")
+    ]
+    np.testing.assert_array_equal([lines[0][-1], lines[1][0]], [[1.7, 1.9], [branch[2].volume, branch[2].pressure]])
+    assert [arrow.xy.tolist() for arrow in axes.texts] == [[branch[2].volume, branch[2].pressure]]
+    assert "snap" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_early_end_is_marked(branch: Branch) -> None:
+    for status in (Status.STEP_LIMIT, Status.LEGENDRE_FAILURE):
+        (axes,) = plots.plot_pressure_volume(dataclasses.replace(branch, status=status)).axes
+        (cross,) = (line for line in axes.lines if line.get_label() == f"ends here: {status}")
+        assert cross.get_xydata().tolist() == [[branch[-1].volume, branch[-1].pressure]]
+
+
+def test_ill_posed_stretch_is_not_judged(branch: Branch) -> None:
+    marked = tuple(dataclasses.replace(e, status=Status.LEGENDRE_FAILURE) if k > 1 else e for k, e in enumerate(branch))
+    assert "ill-posed (Legendre condition fails)" in styles(plots.plot_pressure_volume(dataclasses.replace(branch, equilibria=marked)))
+
+
+def test_draw_branch_onto_axes(branch: Branch) -> None:
+    """Other quantities, several branches in one picture without naming anything twice, one style for all."""
+    figure, (left, right) = plots.new_figure((8, 4), title="two", widths=(1, 2))
+    plots.draw_branch(left, branch, across="center_height", up="volume")
+    plots.draw_branch(left, branch, across="center_height", up="volume")
+    labels = plots.legend_entries(left)[1]
+    assert labels == ["stable under both controls", "stable under volume control only"]
+    assert left.get_xlabel() == "pole height η(0)/R₀"
+    plots.draw_branch(right, branch, style=plots.Style("grey", "-", "0.5"), dots=False)
+    (line,) = right.lines
+    assert (line.get_label(), line.get_color()) == ("grey", "0.5")
+    with pytest.raises(InputError, match="center_height"):
+        plots.draw_branch(left, branch, across="centre_height")
 
 
 def test_one_equilibrium(branch: Branch, tmp_path: Path) -> None:

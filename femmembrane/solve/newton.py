@@ -14,7 +14,7 @@ from .controls import Control
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
-RESIDUAL = 1e-9
+RESIDUAL = 1e-12
 
 
 @dataclass(slots=True)
@@ -87,7 +87,7 @@ def correct(
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
             result = last.result(iteration, foretold, Status.CONVERGED)
-            if result.residual <= RESIDUAL:
+            if last.finite and result.residual <= RESIDUAL:
                 return result
         previous = size
 
@@ -107,7 +107,7 @@ class Equations:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
         self.gap, row, corner = control.equation(potential.space, x, pressure, evaluation)
-        self.finite = bool(np.isfinite(self.force).all())
+        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.band).all())
         if bordered is None and self.finite:
             bordered = BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
         self.bordered = bordered

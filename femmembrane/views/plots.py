@@ -75,8 +75,6 @@ MARKERS = {
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
 }
-#: the verdicts that can change at each kind of special point (all of them at a kind not listed)
-_CHANGES: dict[str, tuple[Any, ...]] = {"limit_point": ("pressure",), "volume_fold": ("volume",), "height_fold": ()}
 
 
 def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
@@ -286,9 +284,21 @@ def _coordinates(items: Sequence[Equilibrium | SpecialPoint], quantities: Sequen
     return np.array([[getattr(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
 
 
-#: the special points between two neighbouring equilibria, in order: their kinds and their places in the picture; a snap is the last
-_Gap = list[tuple[str, Array]]
-_SNAP = "snap"
+#: the special points between two neighbouring equilibria, in order: the verdicts that can change there (None: any) and their places in
+#: the picture; a snap is the last
+_Gap = list[tuple[tuple[Any, ...] | None, Array]]
+_SNAP = ("snap",)
+
+
+def _changes(point: SpecialPoint) -> tuple[Any, ...] | None:
+    """The verdicts that can change at a special point, by control or number of waves."""
+    of_kind: dict[str, tuple[Any, ...]] = {
+        "limit_point": ("pressure",),
+        "volume_fold": ("volume",),
+        "height_fold": (),
+        "azimuthal_onset": (point.azimuthal,),
+    }
+    return of_kind.get(str(point.kind))
 
 
 def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
@@ -301,13 +311,13 @@ def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
     scale = np.maximum(np.ptp(points, axis=0), 1e-300) if len(points) else 1.0
     a, b = points[:-1] / scale, points[1:] / scale
     direct = np.linalg.norm(b - a, axis=1)
-    inside: list[list[tuple[float, str, Array]]] = [[] for _ in direct]
+    inside: list[list[tuple[float, SpecialPoint, Array]]] = [[] for _ in direct]
     places, pictured = _coordinates(special, tuple(QUANTITIES)) / scale, _coordinates(special, quantities)
     for item, place, drawn in zip(special, places, pictured, strict=True):
         detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
         if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
-            inside[k].append((float((place - a[k]) @ (b[k] - a[k])), str(item.kind), drawn))
-    ordered = [[(kind, drawn) for _, kind, drawn in sorted(gap, key=lambda item: item[0])] for gap in inside]
+            inside[k].append((float((place - a[k]) @ (b[k] - a[k])), item, drawn))
+    ordered: list[_Gap] = [[(_changes(item), drawn) for _, item, drawn in sorted(gap, key=lambda g: g[0])] for gap in inside]
     for jump in branch.jumps:
         for k, (before, landing) in enumerate(pairwise(branch)):
             if landing is jump.landing:  # by way of the fold where the branch turned back
@@ -329,10 +339,10 @@ def _segments(points: Array, words: Sequence[dict[Any, str]], gaps: Sequence[_Ga
     pieces: list[_Segment | None] = []
     for k, gap in enumerate(gaps):
         at, now, after, end = points[k], words[k], words[k + 1], points[k + 1]
-        for kind, place in gap:
+        for changes, place in gap:
             pieces.append(_Segment(at, place, now))
-            at, now = place, {c: after[c] if c in _CHANGES.get(kind, (c,)) else word for c, word in now.items()}
-        if gap and gap[-1][0] == _SNAP:
+            at, now = place, {c: after[c] if changes is None or c in changes else word for c, word in now.items()}
+        if gap and gap[-1][0] is _SNAP:
             pieces.append(None)
             continue
         if now != after:  # somewhere here
@@ -364,12 +374,13 @@ def _draw_lines(axes: Axes, pieces: Sequence[_Segment | None], classify: Callabl
 
 
 def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
-    """A grey band behind the stretches that lose stability to an azimuthal mode."""
+    """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them."""
     words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
     for lost, line in _lines(_segments(points, words, gaps), lambda w: tuple(n for n, word in w.items() if word == "unstable")):
         if lost:
             label = _new(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
-            axes.plot(*line.T, color="0.82", linewidth=8, solid_capstyle="butt", zorder=1, label=label)
+            grey = str(max(0.84 - 0.14 * (len(lost) - 1), 0.4))
+            axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=label)
 
 
 def _draw_jumps(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
@@ -390,6 +401,10 @@ def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) 
         places = _coordinates([p for p in points if str(p.kind) == kind], quantities)
         look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
         axes.plot(*places.T, marker, label=_new(axes, label), zorder=4, **look)
+    for point, place in zip(points, _coordinates(points, quantities), strict=True):
+        if point.azimuthal:
+            text = {"xytext": (7, -3), "textcoords": "offset points", "fontsize": 8}
+            axes.annotate(f"n = {point.azimuthal}", place, zorder=5, annotation_clip=True, **text)
 
 
 def _new(axes: Axes, label: str) -> str | None:

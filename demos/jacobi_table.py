@@ -44,14 +44,18 @@ EXACT = {
 }
 
 CLOSING = """
-Where the printed form fails, and why. Its conditions hold the pole in place (U = 0 there), but the pole of a membrane is free to rise.
-A limit point is the state at which a perturbation that lifts the pole costs nothing, and this is the perturbation that the printed form
-cannot see: past the limit point of every balloon it goes on to answer "stable" ({wrong} of the {unstable} unstable states here). It
-finds conjugate points only where the energy falls so steeply, close to a strong dipole, that it does so with the pole held as well; even
-there its points, and past the volume fold its answer, depend on the radius from which one integrates ({unsure} of {rows} states), since
-Jacobi's equation is singular at the pole and has no solution with U = 0 and U' = 1. Of the two defects this is the first; the second is
-that F_y'y, which is not symmetric, stands where its transpose belongs. With the pole free and the transpose restored, the conjugate
-points are as many as the falling directions, and enter through the rim exactly at a limit point.
+Where the printed form fails, and why. It answers "stable" for {wrong} of the {unstable} unstable states: on the unstable side of every
+limit point here. It finds conjugate points, and then says no more than "unclear", close to a strong dipole only; there they depend on
+the radius from which one integrates, and in {unsure} of {rows} rows the answer does. It has two defects; each by itself loses conjugate
+points:
+
+1. The mixed derivative F_y'y of the integrand is not symmetric (the pressure enters it as P rho), and the printed equation has its
+   transpose in its place. With this alone, the pole left free, no conjugate point is found on the falling branch of a balloon.
+2. U = 0 holds the pole, which is free to rise. A membrane cannot be held at a point: held is the circle from which one integrates, and
+   that hold fades only as the logarithm of its radius. Next to a limit point, where the energy barely falls, it hides the fall.
+
+With the right derivative and a free pole, the conjugate points are as many as the falling directions, and enter through the rim exactly
+at a limit point.
 """
 
 

@@ -5,7 +5,7 @@ length from V = 0.1 past three limit points (dP = 0) and a fold of the volume (d
 the first two limit points are those of every rubber balloon, the third and the fold are the dipole's pull. On the right the membrane at
 V = 75, as seen from the side.
 
-    python demos/overview.py                    picture and tables in out/overview, 5 seconds
+    python demos/overview.py                    picture and tables in out/overview, 6 seconds
 
 Sources: material and scene from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1 and figure 4. The special points
 asserted at the end are those of an independent spectral Ritz solver, converged to more digits than are given.
@@ -56,8 +56,10 @@ def draw_curve(axes: Any, branch: fm.Branch, inflated: fm.Equilibrium) -> None:
     axes.set_xlim(0, 90)
     axes.set_ylim(0, 2.05)
     axes.set_title(r"Equilibria of a disc below a dipole, $M = 200$, $h = 6.5\,R_0$", fontsize=13, loc="left")
-    plots.draw_legend(axes, fontsize=11, loc="lower left", bbox_to_anchor=(0.13, 0.02), labelspacing=0.35)
-    inset = axes.inset_axes((0.60, 0.47, 0.36, 0.23))
+    plots.draw_legend(
+        axes, "among axisymmetric shapes:", fontsize=11, title_fontsize=11, loc="lower left", bbox_to_anchor=(0.13, 0.02), labelspacing=0.3
+    )
+    inset = axes.inset_axes((0.60, 0.485, 0.36, 0.225))
     plots.draw_branch(inset, branch, dots=False)
     inset.set(xlim=(81.95, 83.0), ylim=(1.9225, 1.936), xlabel="", ylabel="", xticks=(82, 82.5, 83), yticks=(1.925, 1.93, 1.935))
     inset.tick_params(labelsize=10)

@@ -45,6 +45,8 @@ def _scene_of(table: Mapping[str, Any]) -> fm.Scene:
 
 
 SCENES: Mapping[str, fm.Scene] = MappingProxyType({table["name"]: _scene_of(table) for table in _TABLES})
+#: limit points and volume folds of each scene, along the branch
+SPECIAL_POINTS: Mapping[str, list[dict[str, Any]]] = MappingProxyType({table["name"]: table["special_points"] for table in _TABLES})
 
 
 @dataclass(frozen=True, eq=False)

@@ -276,7 +276,7 @@ def test_snap_is_an_arrow(branch: Branch) -> None:
         line.get_xydata() for line in axes.lines if line.get_label() in ("stable under both controls", "stable under volume control only")
     ]
     np.testing.assert_array_equal([lines[0][-1], lines[1][0]], [[1.7, 1.9], [branch[2].volume, branch[2].pressure]])
-    assert [arrow.xy.tolist() for arrow in axes.texts] == [[branch[2].volume, branch[2].pressure]]
+    assert [tuple(arrow.xy) for arrow in axes.texts] == [(branch[2].volume, branch[2].pressure)]
     assert "snap" in [text.get_text() for text in axes.get_legend().get_texts()]
 
 
@@ -294,7 +294,7 @@ def test_ill_posed_stretch_is_not_judged(branch: Branch) -> None:
 
 def test_draw_branch_onto_axes(branch: Branch) -> None:
     """Other quantities, several branches in one picture without naming anything twice, one style for all."""
-    figure, (left, right) = plots.new_figure((8, 4), title="two", widths=(1, 2))
+    _, (left, right) = plots.new_figure((8, 4), title="two", widths=(1, 2))
     plots.draw_branch(left, branch, across="center_height", up="volume")
     plots.draw_branch(left, branch, across="center_height", up="volume")
     labels = plots.legend_entries(left)[1]

@@ -7,8 +7,8 @@ general curve, so a new shape is a new class here and nothing more.
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ class Meridian(Hashable, Protocol):
 
     def tangent(self, s: Array) -> tuple[Array, Array]:
         """(dR/ds, dZ/ds) at s."""
+
+    def refined(self) -> Self:
+        """The same shape with every element halved."""
 
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         """Displacements held at the first and last point: subsets of {"u", "w"}."""
@@ -83,6 +86,9 @@ class Disc:
 
     def tangent(self, s: Array) -> tuple[Array, Array]:
         return np.ones_like(s), np.zeros_like(s)
+
+    def refined(self) -> Self:
+        return replace(self, elements=2 * self.elements)
 
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         return frozenset({"u"}), frozenset({"u", "w"})

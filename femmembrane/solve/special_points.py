@@ -28,6 +28,8 @@ _CONTROLS: dict[str, Callable[[float], Control]] = {
     "volume": VolumeControl,
     "center_height": CenterHeightControl,
 }
+#: tolerance at which a point is put on a prescribed value
+_EXACT = 1e-13
 
 
 @dataclass(slots=True)
@@ -122,9 +124,8 @@ class Segment:
         """The point at which a quantity takes a value, exactly: corrected under that control."""
         share = brentq(lambda s: self.value(quantity, self.at(s)) - value, 0.0, 1.0, xtol=1e-10)
         point = self.at(share)
-        exact = correct(
-            self.potential, _CONTROLS[quantity](value), point.state.x, value if quantity == "pressure" else point.state.pressure
-        )
+        pressure = value if quantity == "pressure" else point.state.pressure
+        exact = correct(self.potential, _CONTROLS[quantity](value), point.state.x, pressure, tolerance=_EXACT)
         if exact.status is Status.CONVERGED:  # singular only where the fold in this very quantity lies on the value
             sigma = point.sigma
             point = tangent_at(self.potential, State.of(exact), point)

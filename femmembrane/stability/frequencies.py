@@ -6,7 +6,8 @@ eigenvalues lambda of a verdict are squared frequencies. Each gives a pair of ro
     lambda > 0     s = +- i omega             oscillation, omega = sqrt(lambda)
     lambda < 0     s = +- growth_rate         departure, growth_rate = sqrt(-lambda)
 
-The gas has no inertia of its own here, and there is no damping.
+The gas has no inertia of its own here, and there is no damping. Whether a state is stable is for its verdicts to say: they know how far
+an eigenvalue near zero is to be believed.
 """
 
 from __future__ import annotations
@@ -59,11 +60,6 @@ class Vibration:
     def growth_rate(self) -> float:
         """Rate of departure in the units of omega, the real part of s: 0 where the membrane oscillates."""
         return float(np.sqrt(max(-self.eigenvalue, 0.0)))
-
-    @property
-    def stable(self) -> bool | None:
-        """None when the eigenvalue is zero within its error."""
-        return None if abs(self.eigenvalue) <= self.error else self.eigenvalue > 0
 
     @property
     def mode(self) -> Mapping[str, Array]:

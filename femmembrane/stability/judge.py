@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
-from ..errors import InputError
-from ..potential import Array, Evaluation, Potential
+from ..errors import InputError, Status
+from ..potential import Array, Evaluation, Potential, potential_of
+from ..scene import MAX_DEGREE
+from ..solve.controls import PressureControl, VolumeControl
+from ..solve.newton import correct
 from .azimuthal import azimuthal_verdict
 from .verdict import CONTROLS, Verdict, axisymmetric_verdict
+
+#: size of an eigenvalue below which its discretisation error is estimated before its sign is believed
+SMALL = 1e-2
 
 
 def judge(
@@ -30,10 +40,48 @@ def judge(
     """
     if isinstance(azimuthal, bool) or not isinstance(azimuthal, (int, np.integer)) or azimuthal < 0:
         raise InputError("azimuthal", azimuthal, "a whole number >= 0 is allowed")
-    if azimuthal:
-        if control is not None:
-            raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
-        return azimuthal_verdict(potential, x, pressure, int(azimuthal), guess)
-    if control is None:
+    if azimuthal and control is not None:
+        raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
+    if not azimuthal and control is None:
         raise InputError("control", control, "one of " + ", ".join(CONTROLS) + " is allowed, or azimuthal=1, 2, ...")
+    ask = partial(_verdict, control=control, azimuthal=int(azimuthal), compliance=compliance)
+    verdict = ask(potential, x, pressure, evaluation, guess=guess)
+    if abs(verdict.smallest_eigenvalue) < SMALL:  # never for NaN
+        verdict = _with_discretisation_error(verdict, potential, x, pressure, ask)
+    return verdict
+
+
+def _verdict(
+    potential: Potential,
+    x: Array,
+    pressure: float,
+    evaluation: Evaluation,
+    *,
+    control: str | None,
+    azimuthal: int,
+    compliance: float | None,
+    guess: Array | None = None,
+) -> Verdict:
+    if azimuthal or control is None:
+        return azimuthal_verdict(potential, x, pressure, azimuthal, guess)
     return axisymmetric_verdict(potential, evaluation, control, guess, compliance)
+
+
+def _with_discretisation_error(verdict: Verdict, potential: Potential, x: Array, pressure: float, ask: Callable[..., Verdict]) -> Verdict:
+    """Solve again on elements of one degree more (or half the size): by how much an eigenvalue near zero moves decides its sign."""
+    scene, space = potential.scene, potential.space
+    finer = potential_of(scene.replace(degree=scene.degree + 1) if scene.degree < MAX_DEGREE else scene.replace(mesh=scene.mesh.refined()))
+    points = finer.space.interpolation_points()
+    u, _, w, _ = space.evaluate(x, points.ravel())
+    start = finer.space.interpolate(u.reshape(points.shape), w.reshape(points.shape))
+    # held is what stays regular where this eigenvalue vanishes
+    held = PressureControl(pressure) if verdict.control == "volume" else VolumeControl(potential.evaluate(x, pressure).volume)
+    result = correct(finer, held, start, pressure)
+    if result.status is not Status.CONVERGED:
+        return verdict
+    better = ask(finer, result.x, result.pressure, result.evaluation)
+    error = verdict.error + abs(better.smallest_eigenvalue - verdict.smallest_eigenvalue)
+    if not abs(verdict.smallest_eigenvalue) <= error:
+        return replace(verdict, error=error)
+    reason = f"marginal: the smallest eigenvalue {verdict.smallest_eigenvalue:.3g} is zero within its discretisation error {error:.1g}"
+    return replace(verdict, stable=None, error=error, reason=reason)

@@ -92,6 +92,7 @@ class _Pencil:
 
     def normalised(self, mode: Array) -> tuple[Array, Array]:
         """Mode and M mode with mode . M mode = 1, the largest entry of the mode positive."""
+        mode = mode / np.abs(mode).max()  # a solve with a singular matrix may leave numbers whose squares overflow
         product = band_product(self.mass, self.kd, mode)
         size = np.sqrt(mode @ product) * np.sign(mode[np.argmax(np.abs(mode))])
         return mode / size, product / size

@@ -35,7 +35,8 @@ class Verdict:
     smallest_eigenvalue : float
         lambda of K phi = lambda M phi, a squared natural frequency in units of mu/(rho_m R0^2); NaN where no eigenvalue has a meaning.
     error : float
-        Bound on the algebraic error of the eigenvalue.
+        Of the eigenvalue: a bound on the algebraic error; where the eigenvalue is below 0.01 also the discretisation error, estimated on
+        elements of one degree more.
     control : str or None
         "pressure", "volume" or "gas"; None for azimuthal perturbations, where both agree.
     azimuthal : int

@@ -128,7 +128,7 @@ def render_mode(
     """
     import pyvista
 
-    surface = _ModeSurface(equilibrium, mode, amplitude)
+    surface = _ModeSurface(equilibrium, mode, amplitude, sectors=4 * SECTORS)
     with replace_file(path) as temporary, pyvista.vtk_verbosity("off"):  # VTK reports a missing display before it does without
         plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
         try:
@@ -141,13 +141,13 @@ def render_mode(
 class _ModeSurface:
     """Points of the equilibrium and their displacements at full amplitude."""
 
-    def __init__(self, equilibrium: Equilibrium, mode: Vibration | Verdict, amplitude: float | None) -> None:
+    def __init__(self, equilibrium: Equilibrium, mode: Vibration | Verdict, amplitude: float | None, sectors: int = SECTORS) -> None:
         shape = _shape(equilibrium, mode)
         self.n, self.caption = mode.azimuthal, _caption(mode)
         profile = smooth_profile(equilibrium)
         self.rho, self.eta = profile["rho"], profile["eta"]
         self.extent = _extent(profile)
-        self.revolution = Revolution.of(profile["r"], sectors=max(SECTORS, _PER_WAVE * self.n))
+        self.revolution = Revolution.of(profile["r"], sectors=max(sectors, _PER_WAVE * self.n))
         self.rest = self.revolution.vectors(self.rho, self.eta)
         unit = _displacements(self.revolution, shape, self.n)
         if amplitude is None:

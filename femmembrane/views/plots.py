@@ -403,8 +403,7 @@ def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) 
         axes.plot(*places.T, marker, label=_new(axes, label), zorder=4, **look)
     for point, place in zip(points, _coordinates(points, quantities), strict=True):
         if point.azimuthal:
-            text = {"xytext": (7, -3), "textcoords": "offset points", "fontsize": 8}
-            axes.annotate(f"n = {point.azimuthal}", place, zorder=5, annotation_clip=True, **text)
+            axes.annotate(f"n = {point.azimuthal}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, zorder=5)
 
 
 def _new(axes: Axes, label: str) -> str | None:

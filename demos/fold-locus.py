@@ -1,4 +1,3 @@
-# ruff: noqa: T201
 """Where the magnetic limit point moves as the dipole gets stronger.
 
 Above a membrane with a dipole the pressure has a second maximum, at a large volume: from there on the dipole pulls the membrane up by

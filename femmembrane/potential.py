@@ -377,7 +377,17 @@ def _point_rows(symbols: list[ca.SX], rows: list[ca.SX]) -> ca.Function:
 
 
 def _at_points(function: ca.Function, *columns: Array) -> Array:
-    return np.asarray(function.map(np.size(columns[0]))(np.stack([np.ravel(c) for c in columns])))
+    values = np.stack([np.ravel(c) for c in columns])
+    if values.shape[1] == 0:
+        return np.zeros((function.numel_out(0), 0))
+    return _kernel_at(function, values.shape[1])(values, np.zeros(0)).copy()
+
+
+@lru_cache(maxsize=64)
+def _kernel_at(function: ca.Function, n: int) -> _Kernel:
+    """A function of the local variables alone as a kernel at n points."""
+    symbols = [ca.SX.sym("data", 0), function.sx_in(0), ca.SX.sym("parameters", 0)]
+    return _Kernel(ca.Function("at_points", symbols, [function(symbols[1])]), np.zeros((0, n)))
 
 
 @contextmanager

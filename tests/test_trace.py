@@ -102,7 +102,7 @@ def test_trace_stops_where_the_legendre_condition_fails():
     scene = disc_scene(OGDEN, (600.0, -3.25), elements=32, degree=4)
     branch = fm.trace(scene, start=2.1, until={"center_height": 0.0}, direction=-1, throw=False)
     assert branch.status is fm.Status.LEGENDRE_FAILURE
-    assert "compressive at r in" in branch.message
+    assert "compressive at r" in branch.message
     last = branch[-1]
     assert last.status is fm.Status.LEGENDRE_FAILURE
     assert 0.30 < last.center_height < 0.335

@@ -264,7 +264,7 @@ class Branch(Sequence[Equilibrium]):
 
     def __getitem__(self, index: int | slice) -> Equilibrium | Branch:
         if isinstance(index, slice):
-            return replace(self, equilibria=self.equilibria[index], memory=None)
+            return replace(self, equilibria=self.equilibria[index], special_points=None, memory=None, jumps=())
         return self.equilibria[index]
 
     def __iter__(self) -> Iterator[Equilibrium]:

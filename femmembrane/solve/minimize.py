@@ -14,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..discretization.space import HESSIAN_PAIRS
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential, vectorise
 from .banded import negative_directions
@@ -41,7 +42,6 @@ class NlpFunctions:
     hessian: ca.Function
     volume: ca.Function
     volume_gradient: ca.Function
-    sparsity: ca.Sparsity
 
 
 def minimize(
@@ -101,7 +101,7 @@ def _solver(potential: Potential, constrained: bool, max_iterations: int) -> ca.
 
 
 def minimize_and_verify(
-    potential: Potential, control: Control, x: Array, pressure: float, *, magnetic: float = 1.0, max_iterations: int = 60
+    potential: Potential, control: Control, x: Array, pressure: float, *, magnetic: float = 1.0, max_iterations: int = 30
 ) -> NewtonResult:
     """IPOPT, then our own check: residual and constraint by the bordered corrector, inertia for a minimum.
 
@@ -140,33 +140,31 @@ def nlp_functions(potential: Potential) -> NlpFunctions:
     local = ca.reshape(ca.mtimes(ca.DM(space.evaluation_matrix()), scale * y), n, 4)
     data = ca.DM(potential.point_data.T)
 
-    def assembled(function: ca.Function, parameters: ca.MX) -> ca.MX:
-        return vectorise(function, n)(data, local, parameters)
+    t, (_, local_symbol, parameters) = potential.terms, potential.symbols
+    total = t["elastic"] + t["magnetic"] - parameters[0] * t["volume"]
+    force = t["gradient"] - parameters[0] * t["volume_gradient"]
+    curvature = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local_symbol)
 
-    plain = ca.vertcat(0.0, p[1])
-    t, symbols = potential.terms, list(potential.symbols)
-    values = assembled(
-        ca.Function("values", symbols, [ca.densify(ca.vertcat(t["elastic"] + t["magnetic"], t["volume"]))], {"cse": True}), plain
-    )
-    gradients = assembled(
-        ca.Function("gradients", symbols, [ca.densify(ca.vertcat(t["gradient"], t["volume_gradient"]))], {"cse": True}), plain
-    )
+    def at_points(expressions: list[ca.SX], pressure: ca.MX) -> ca.MX:
+        """Expressions at all points, one column each: every function below computes what it returns and nothing else."""
+        function = ca.Function("rows", list(potential.symbols), [ca.densify(ca.vertcat(*expressions))], {"cse": True})
+        return vectorise(function, n)(data, local, ca.vertcat(pressure, p[1]))
+
     integrate = ca.DM(space.evaluation_matrix().T)
-    e_x, v_x = (scale * ca.mtimes(integrate, ca.vec(gradients[:, k : k + 4])) for k in (0, 4))
-    energy, volume = ca.sum1(values[:, 0]), ca.sum1(values[:, 1])
+    both = at_points([total, force], p[0])
+    gradient = scale * ca.mtimes(integrate, ca.vec(both[:, 1:]))
+    volume = ca.sum1(at_points([t["volume"]], p[0])) / p[5]
+    volume_gradient = scale * ca.mtimes(integrate, ca.vec(at_points([t["volume_gradient"]], p[0]))) / p[5]
     rows, columns, integrator = space.hessian_matrix()
     # the Lagrangian lam_f (E - P V)/objective + lam_g V/volume has the Hessian of E - q V with this q
     multiplier = p[0] - lam_g / lam_f * p[4] / p[5]
-    second = assembled(potential.point_function, ca.vertcat(multiplier, p[1]))[:, 11:21]
+    second = at_points([curvature[a, b] for a, b in HESSIAN_PAIRS], multiplier)
     entries = ca.mtimes(ca.DM(integrator), ca.vec(second)) * (scale[rows] * scale[columns]) * (lam_f / p[4])
-    sparsity = ca.Sparsity.triplet(space.n_free, space.n_free, rows, columns)
-    hessian = ca.MX(sparsity, entries)
-    f = (energy - p[0] * volume) / p[4]
+    hessian = ca.MX(ca.Sparsity.triplet(space.n_free, space.n_free, rows, columns), entries)
     return NlpFunctions(
-        value=ca.Function("nlp_f", [y, p], [f]),
-        gradient=ca.Function("nlp_grad_f", [y, p], [f, (e_x - p[0] * v_x) / p[4]]),
+        value=ca.Function("nlp_f", [y, p], [ca.sum1(at_points([total], p[0])) / p[4]]),
+        gradient=ca.Function("nlp_grad_f", [y, p], [ca.sum1(both[:, 0]) / p[4], gradient / p[4]]),
         hessian=ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [hessian]),
-        volume=ca.Function("nlp_g", [y, p], [volume / p[5]]),
-        volume_gradient=ca.Function("nlp_jac_g", [y, p], [volume / p[5], v_x.T / p[5]]),
-        sparsity=sparsity,
+        volume=ca.Function("nlp_g", [y, p], [volume]),
+        volume_gradient=ca.Function("nlp_jac_g", [y, p], [volume, volume_gradient.T]),
     )

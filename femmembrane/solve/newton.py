@@ -82,8 +82,8 @@ def correct(
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c at most, spares the last factorisation; the residual has the last word
-        foretold = size * (size / previous) ** 2 if length == 1 else np.inf
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual has the last word
+        foretold = size * (min(size, 1.0) if previous == np.inf else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
             result = last.result(iteration, foretold, Status.CONVERGED)
@@ -161,5 +161,8 @@ def relative_size(potential: Potential, dx: Array, x: Array) -> float:
 def relative_residual(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> float:
     """Out-of-balance force over the forces that meet at a node, the larger of the two components."""
     scales = potential.force_scale(evaluation, pressure)
-    parts = [float(np.abs(residual[index]).max(initial=0.0)) / s for index, s in zip(potential.space.fields, scales, strict=True) if s > 0]
-    return max(parts, default=0.0)
+    parts = [
+        0.0 if s == 0 else float(np.abs(residual[index]).max(initial=0.0)) / s
+        for index, s in zip(potential.space.fields, scales, strict=True)
+    ]
+    return max(parts) if all(np.isfinite(parts)) else np.inf

@@ -21,7 +21,7 @@ from .state import Path, State, distance
 #: largest change that the corrector may make, relative to the step
 MAX_DEVIATION = 0.2
 #: a step this much shorter than the distance to go means that the branch turns or ends
-MIN_STEP = 1e-6
+MIN_STEP = 1e-4
 
 Corrector = Callable[..., NewtonResult]
 

@@ -92,7 +92,7 @@ def axisymmetric_verdict(
     where = compressed(potential, evaluation)
     if where is not None:
         reason = (
-            f"short-wave unstable: the meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}], where the "
+            f"short-wave unstable: the meridional stress is compressive at {interval(*where)}, where the "
             "Legendre-Hadamard condition fails and the spectrum has no lower bound under refinement"
         )
         return Verdict(False, np.nan, np.nan, control, 0, None, reason)
@@ -121,6 +121,11 @@ def mode_shape(space: Space, mode: Array) -> dict[str, Array]:
     s = space.node_parameters()
     u, _, w, _ = space.evaluate(mode, s)
     return {"r": space.mesh.position(s)[0], "u": u, "w": w}
+
+
+def interval(low: float, high: float) -> str:
+    """Reference radii in words."""
+    return f"r = {low:.3g}" if f"{low:.3g}" == f"{high:.3g}" else f"r in [{low:.3g}, {high:.3g}]"
 
 
 def compressed(potential: Potential, evaluation: Evaluation) -> tuple[float, float] | None:

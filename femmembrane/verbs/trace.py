@@ -17,7 +17,7 @@ from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
 from ..solve.start import start_at_volume
 from ..solve.state import Path
 from ..stability.azimuthal import azimuthal_eigenvalue
-from ..stability.verdict import compressed
+from ..stability.verdict import compressed, interval
 from ..threads import one_thread
 from .recording import OnStep, record, resume
 
@@ -185,7 +185,7 @@ class _Tracing:
             if where is not None and ill_posed == "stop":
                 return Status.LEGENDRE_FAILURE, (
                     f"at pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g}) the "
-                    f"meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}]: the Legendre-Hadamard condition fails "
+                    f"meridional stress is compressive at {interval(*where)}: the Legendre-Hadamard condition fails "
                     "there, and what a mesh finds beyond depends on the mesh"
                 )
             if self._contact(new):

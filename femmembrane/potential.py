@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: compression, relative to the largest stress, from which the Legendre-Hadamard condition counts as failed
+COMPRESSION = 1e-8
 #: points evaluated in one go; larger vectors leave the processor's cache
 _BLOCK = 1024
 
@@ -79,6 +81,7 @@ class Potential:
         with _casadi_answers_numpy():
             self.symbols, self.terms = _point_expressions(scene, self._flat)
         self.n_points = self.point_data.shape[1]
+        self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
 
     @cached_property
     def mass(self) -> Array:
@@ -118,22 +121,13 @@ class Potential:
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales the magnetic energy."""
-        space = self.space
+        space, shape = self.space, self._force_shape
         out = self._kernel(space.at_quadrature(x), np.array([pressure, magnetic]))
-        if not np.isfinite(out).all():
-            return self._undefined()
-        e, m, v = out[:3].sum(axis=1)
-        ne = space.n_elements
-        return Evaluation(
-            float(e),
-            float(m),
-            float(v),
-            space.assemble_vector(out[3:7].reshape(-1, ne)),
-            space.assemble_vector(out[7:11].reshape(-1, ne)),
-            space.assemble_band(out[11:21].reshape(-1, ne)),
-            out[21:23].copy(),
-            out[3:11].copy(),
-        )
+        e, m, v = out[:3].sum(axis=1).tolist()
+        force_density = out[3:11].copy()
+        gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
+        band = space.assemble_band(out[11:21].reshape(-1, space.n_elements))
+        return Evaluation(e, m, v, gradient, volume_gradient, band, out[21:23].copy(), force_density)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
@@ -144,19 +138,20 @@ class Potential:
         rho, eta = np.append(space.R + u, 0.0), np.append(space.Z + w, space.center_height(x))
         return float(min(np.sqrt(source.distance_squared(rho, eta).min()) for source in self.sources))
 
+    def compressed(self, evaluation: Evaluation) -> tuple[float, float] | None:
+        """Interval of reference radii with meridional compression, where the Legendre-Hadamard condition fails; None without."""
+        bad = evaluation.stress[0] < -COMPRESSION * np.abs(evaluation.stress).max(initial=0.0)
+        if not bad.any():
+            return None
+        r = self.space.R.ravel()[bad]
+        return float(r.min()), float(r.max())
+
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
         space = self.space
-        elastic, volume = (np.abs(d).reshape(-1, space.n_elements) for d in (evaluation.force_density[:4], evaluation.force_density[4:]))
-        total = space.assemble_magnitude(elastic) + abs(pressure) * space.assemble_magnitude(volume)
+        density = np.abs(evaluation.force_density).reshape(self._force_shape)
+        total = space.assemble_magnitude(density[0] + abs(pressure) * density[1])
         return tuple(float(total[index].max(initial=0.0)) for index in space.fields)
-
-    def _undefined(self) -> Evaluation:
-        """Outside the domain of the energy: a fold of the meridian onto itself, a radius past the axis, a source."""
-        n, depth = self.space.n_free, 3 * self.space.half_bandwidth + 1
-        nan = np.full(n, np.nan)
-        stress, density = np.full((2, self.n_points), np.nan), np.full((8, self.n_points), np.nan)
-        return Evaluation(np.nan, np.nan, np.nan, nan, nan, np.full((depth, n), np.nan, order="F"), stress, density)
 
     def response(self, e1: Array, e2: Array) -> Array:
         """Principal mechanical stresses and their derivatives with respect to the Hencky strains.

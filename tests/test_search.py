@@ -35,14 +35,13 @@ def test_all_equilibria_below_a_strong_dipole():
     assert heights == pytest.approx([0.307397, 0.453064, 1.4443, 4.1884], rel=1e-4)
 
 
-def test_equilibria_that_no_traced_branch_contains():
-    """Without a dipole the disc at P = 1.7 has three more equilibria of higher modes, unstable under both controls: only deflation finds them."""
-    found = fm.equilibria(disc_scene(OGDEN, elements=32), pressure=1.7)
-    stable = [eq for eq in found if eq.verdict("volume").stable]
-    assert sorted(eq.volume for eq in stable) == pytest.approx([1.57034, 5.3143, 54.055], rel=1e-4)
-    others = [eq for eq in found if not eq.verdict("volume").stable]
-    assert others
-    assert all(eq.residual < 1e-10 for eq in others)
+@pytest.mark.parametrize("elements", [16, 64])
+def test_folded_shapes_of_a_mesh_are_no_equilibria(elements):
+    """Without a dipole the disc at P = 1.7 has three equilibria. On some meshes deflation also finds shapes folded within one element,
+    in compression, of which the continuous problem knows nothing: they are left out, and counted."""
+    found = fm.equilibria(disc_scene(OGDEN, elements=elements), pressure=1.7)
+    assert sorted(eq.volume for eq in found) == pytest.approx([1.57034, 5.3143, 54.055], rel=1e-4)
+    assert all(eq.status is fm.Status.CONVERGED for eq in found)
 
 
 def test_equilibria_at_a_volume():

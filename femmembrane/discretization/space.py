@@ -91,6 +91,7 @@ class Space:
         flat = np.where((row < self.n_free) & (column < self.n_free), column * depth + 2 * kd + row - column, spare)
         self._band_index = flat.reshape(n_local**2, -1).ravel()
         self._gather_flat = self.gather.ravel()
+        self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
@@ -117,6 +118,13 @@ class Space:
     def assemble_vector(self, density: Array) -> Array:
         """Integrate derivatives with respect to (u, u_x, w, w_x), shape (4 n_quadrature, n_elements), against the shape functions."""
         return _sum_by(self._gather_flat, self.table.T @ density, self.n_free + 1)[: self.n_free]
+
+    def assemble_vectors(self, density: Array) -> Array:
+        """As :meth:`assemble_vector` for one or two densities at once, shape (k, 4 n_quadrature, n_elements); returns shape (k, n_free)."""
+        k = len(density)
+        local = self.table.T @ density
+        total = _sum_by(self._gather_two[: local.size], local, k * (self.n_free + 1))
+        return total.reshape(k, -1)[:, :-1]
 
     def assemble_magnitude(self, density: Array) -> Array:
         """As :meth:`assemble_vector` for a density >= 0, with no cancellation between shape functions or elements."""

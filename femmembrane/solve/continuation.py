@@ -36,7 +36,7 @@ class StepControl:
     first: float = 0.02
     smallest: float = 1e-7
     largest: float = 0.5
-    deviation: float = 2e-3
+    deviation: float = 5e-4
     turn: float = 0.35
 
 

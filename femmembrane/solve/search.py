@@ -38,6 +38,7 @@ class Search:
     traced: list[tuple[float, float]] = field(default_factory=list)
     iterations: int = 0
     deflations: int = 0
+    ill_posed: list[State] = field(default_factory=list)
     _points: list[BranchPoint] = field(default_factory=list)
 
     def run(self) -> None:
@@ -50,8 +51,8 @@ class Search:
             if not self._on_traced_branch(state):
                 self._trace_both_ways(state)
         while new := self._deflated():
-            self.states.append(new)
-            self._trace_both_ways(new)
+            if self._add(new):
+                self._trace_both_ways(new)
 
     def _trace_both_ways(self, state: State) -> None:
         volumes = [state.volume]
@@ -75,12 +76,20 @@ class Search:
                 return True
         return False
 
-    def _add(self, state: State) -> None:
-        if not self._known(state.x):
-            self.states.append(state)
+    def _add(self, state: State) -> bool:
+        """Keep a state unless it is known; one that is compressed is a folded shape of this mesh, remembered only to be avoided."""
+        if self._known(state.x):
+            return False
+        well_posed = self.potential.compressed(state.evaluation) is None
+        (self.states if well_posed else self.ill_posed).append(state)
+        return well_posed
+
+    @property
+    def _avoided(self) -> list[State]:
+        return self.states + self.ill_posed
 
     def _known(self, x: Array) -> bool:
-        return any(distance(self.potential, x, s.x) <= SAME * distance(self.potential, s.x, 0 * s.x) for s in self.states)
+        return any(distance(self.potential, x, s.x) <= SAME * distance(self.potential, s.x, 0 * s.x) for s in self._avoided)
 
     def _deflated(self) -> State | None:
         """A state not found yet, by Newton's method with the known ones deflated (Farrell, Birkisson and Funke, 2015)."""
@@ -106,7 +115,7 @@ class Search:
                 result = correct(potential, control, x, pressure)
                 return State.of(result) if result.status is Status.CONVERGED else None
             # the deflated step is the Newton step times 1/(1 - d log(deflation) . dx)
-            slope = sum(-2 * self._cosine(x - s.x, dx) for s in self.states)
+            slope = sum(-2 * self._cosine(x - s.x, dx) for s in self._avoided)
             length = 1 / (1 - slope) if abs(1 - slope) > 1e-12 else 1.0
             size = distance(potential, x + dx, x) / max(distance(potential, x, 0 * x), 1e-12)
             length = float(np.clip(length, -1.0, 1.0)) * min(1.0, 1.0 / size if size > 0 else 1.0)

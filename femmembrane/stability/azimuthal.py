@@ -34,11 +34,11 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
-from ..potential import Array, Potential
+from ..potential import COMPRESSION, Array, Potential
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
 from ..threads import one_thread
 from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
-from .verdict import _COMPRESSION, Verdict
+from .verdict import Verdict
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
@@ -516,7 +516,7 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
 def _compression(operator: AzimuthalOperator) -> str:
     """Where a principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails; empty if nowhere."""
     r, R = operator.response, operator.space.R
-    limit = -_COMPRESSION * max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
+    limit = -COMPRESSION * max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
     found = []
     for name, stress, lines in (("meridional", r.s1, "circles"), ("hoop", r.s2, "meridians")):
         bad = R[stress < limit]

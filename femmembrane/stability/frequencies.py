@@ -23,7 +23,6 @@ from ..potential import Array, Potential
 from ..solve.banded import band_product
 from .azimuthal import AzimuthalOperator, _compression, azimuthal_operator, azimuthal_shape, lowest_eigenvalues
 from .spectrum import SpectrumError, _Pencil
-from .verdict import compressed
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,7 @@ def natural_frequencies(
     """
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(x, pressure)
-    where = _short_waves(operator, compressed(potential, evaluation))
+    where = _short_waves(operator, potential.compressed(evaluation))
     if where:
         raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=Status.LEGENDRE_FAILURE)
     try:

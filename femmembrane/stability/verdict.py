@@ -20,8 +20,6 @@ from .spectrum import SmallestEigenvalue, smallest_eigenvalue
 Array = NDArray[np.float64]
 
 CONTROLS = ("pressure", "volume", "gas")
-#: compression, relative to the largest stress, from which the Legendre-Hadamard condition counts as failed
-_COMPRESSION = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,7 @@ def axisymmetric_verdict(
         raise (
             unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
         )
-    where = compressed(potential, evaluation)
+    where = potential.compressed(evaluation)
     if where is not None:
         reason = (
             f"short-wave unstable: the meridional stress is compressive at {interval(*where)}, where the "
@@ -126,13 +124,3 @@ def mode_shape(space: Space, mode: Array) -> dict[str, Array]:
 def interval(low: float, high: float) -> str:
     """Reference radii in words."""
     return f"r = {low:.3g}" if f"{low:.3g}" == f"{high:.3g}" else f"r in [{low:.3g}, {high:.3g}]"
-
-
-def compressed(potential: Potential, evaluation: Evaluation) -> tuple[float, float] | None:
-    """Interval of reference radii with meridional compression."""
-    meridional = evaluation.stress[0]
-    bad = meridional < -_COMPRESSION * np.abs(evaluation.stress).max(initial=0.0)
-    if not bad.any():
-        return None
-    r = potential.space.R.ravel()[bad]
-    return float(r.min()), float(r.max())

@@ -20,7 +20,6 @@ from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
 from ..solve.parameter import Parameter
 from ..solve.state import State
-from ..stability.verdict import compressed
 from ..threads import one_thread
 from .recording import record
 from .trace import CONTACT
@@ -256,7 +255,7 @@ class _Following:
             self.add(new)
             if new.number in self.bounds:
                 return Status.CONVERGED, "", False
-            where = compressed(self.system.family, new.evaluation)
+            where = self.system.family.compressed(new.evaluation)
             if where is not None and ill_posed == "stop":
                 return Status.LEGENDRE_FAILURE, self._ill_posed(where), False
             if self._clearance(new) < CONTACT:

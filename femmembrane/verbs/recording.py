@@ -13,7 +13,7 @@ from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import correct
 from ..solve.state import State
 from ..stability.judge import judge
-from ..stability.verdict import Verdict, compressed
+from ..stability.verdict import Verdict
 
 OnStep = Callable[[int, int, Equilibrium], None]
 
@@ -57,7 +57,7 @@ def record(
         magnetic_energy=state.evaluation.magnetic_energy,
         residual=float(state.residual),
         iterations=state.iterations,
-        status=state.status if compressed(potential, state.evaluation) is None else Status.LEGENDRE_FAILURE,
+        status=state.status if potential.compressed(state.evaluation) is None else Status.LEGENDRE_FAILURE,
         scene=scene,
         state=coefficients,
         seconds=0.0 if clock is None else time.perf_counter() - clock,

@@ -17,7 +17,7 @@ from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
 from ..solve.start import start_at_volume
 from ..solve.state import Path
 from ..stability.azimuthal import azimuthal_eigenvalue
-from ..stability.verdict import compressed, interval
+from ..stability.verdict import interval
 from ..threads import one_thread
 from .recording import OnStep, record, resume
 
@@ -181,7 +181,7 @@ class _Tracing:
             if last is not None:
                 return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
             self.point, self.regular = new, len(self.found)
-            where = compressed(self.potential, new.state.evaluation)
+            where = self.potential.compressed(new.state.evaluation)
             if where is not None and ill_posed == "stop":
                 return Status.LEGENDRE_FAILURE, (
                     f"at pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g}) the "

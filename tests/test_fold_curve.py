@@ -128,7 +128,8 @@ def test_every_fold_agrees_with_a_trace_at_another_strength(kind, index, strengt
     assert curve.values[-1] == strength
     assert curve.equilibria[-1].scene.sources[0].strength == strength
     expected = folds(above(strength), kind)[index]
-    assert curve.pressure[-1] == pytest.approx(expected.pressure, rel=1e-10)
+    # what is stationary at the fold is known to the corrector's tolerance; the rest moves along the branch with its location
+    assert curve.pressure[-1] == pytest.approx(expected.pressure, rel=1e-10 if kind == "limit_point" else 1e-9)
     assert curve.volume[-1] == pytest.approx(expected.volume, rel=1e-8)
     assert curve.center_height[-1] == pytest.approx(expected.center_height, rel=1e-8)
 
@@ -227,7 +228,7 @@ def test_a_limit_point_and_a_volume_fold_meet_and_both_curves_pass():
     for kind in ("volume_fold", "limit_point"):
         start = [p for p in points if p.kind == kind][-1]
         arguments = {"parameter": "source.0.height", "bounds": (-4.5, -0.5), "max_steps": 140, "ill_posed": "mark", "throw": False}
-        curve = fold_curve(scene, start=start, **arguments, steps=StepControl(largest=0.5))
+        curve = fold_curve(scene, start=start, **arguments, steps=StepControl(largest=0.5, deviation=2e-3))
         (meeting,) = [c for c in curve.cusps if c.kind == "branch_point"]
         met.append((meeting.value, meeting.pressure, meeting.volume, meeting.center_height))
     assert met[0] == pytest.approx(met[1], rel=1e-9)
@@ -364,6 +365,6 @@ def test_starts_that_are_no_fold_here_are_refused():
 def test_steps_can_be_chosen():
     start = folds(above(), "limit_point")[2]
     arguments = {"start": start, "parameter": STRENGTH, "bounds": (50.0, 1000.0)}
-    coarse = fold_curve(start.equilibrium.scene, **arguments, steps=StepControl(largest=0.5))
+    coarse = fold_curve(start.equilibrium.scene, **arguments, steps=StepControl(largest=0.5, deviation=2e-3))
     assert len(coarse) < len(magnetic())
     assert coarse.pressure[-1] == pytest.approx(magnetic().pressure[-1], rel=1e-9)

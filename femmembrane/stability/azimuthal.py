@@ -38,7 +38,7 @@ from ..potential import COMPRESSION, Array, Potential
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
 from ..threads import one_thread
 from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
-from .verdict import Verdict
+from .verdict import Verdict, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
@@ -502,15 +502,8 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     if wrinkles:
         return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
     found = _smallest(operator, guess)
-    stable = None if abs(found.value) <= found.error else found.value > 0
     among = f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
-    reason = {
-        True: f"stable: energy rises under all {among} (smallest eigenvalue {found.value:.6g})",
-        False: f"unstable: energy falls in {found.negative} direction(s) among {among} (smallest eigenvalue {found.value:.6g})",
-        None: f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}",
-    }[stable]
-    shape = partial(azimuthal_shape, potential.space, operator.n)
-    return Verdict(stable, found.value, found.error, None, operator.n, found.negative, reason, found.mode, shape)
+    return verdict_from(found, among, None, operator.n, partial(azimuthal_shape, potential.space, operator.n))
 
 
 def _compression(operator: AzimuthalOperator) -> str:

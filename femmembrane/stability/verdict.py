@@ -19,6 +19,9 @@ from .spectrum import SmallestEigenvalue, smallest_eigenvalue
 
 Array = NDArray[np.float64]
 
+#: from the coefficients of a mode to its components at the nodes
+Shape = Callable[[Array], Mapping[str, Array]]
+
 CONTROLS = ("pressure", "volume", "gas")
 
 
@@ -54,7 +57,7 @@ class Verdict:
     negative_directions: int | None
     reason: str
     coefficients: Array | None = field(default=None, repr=False)
-    _shape: Callable[[Array], Mapping[str, Array]] | None = field(default=None, repr=False)
+    _shape: Shape | None = field(default=None, repr=False)
 
     @property
     def mode(self) -> Mapping[str, Array] | None:
@@ -99,19 +102,19 @@ def axisymmetric_verdict(
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
     found = smallest_eigenvalue(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, guess, soft)
-    return _judge(potential, found, control)
+    held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control]
+    return verdict_from(found, f"axisymmetric perturbations {held}", control, 0, partial(mode_shape, potential.space))
 
 
-def _judge(potential: Potential, found: SmallestEigenvalue, control: str) -> Verdict:
+def verdict_from(found: SmallestEigenvalue, among: str, control: str | None, n: int, shape: Shape) -> Verdict:
+    """The verdict that a smallest eigenvalue means for a class of perturbations, named in words."""
     stable = None if abs(found.value) <= found.error else found.value > 0
-    held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}
-    among = f"axisymmetric perturbations {held[control]}"
     reason = {
         True: f"stable: energy rises under all {among} (smallest eigenvalue {found.value:.6g})",
         False: f"unstable: energy falls in {found.negative} direction(s) among {among} (smallest eigenvalue {found.value:.6g})",
         None: f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}",
     }[stable]
-    return Verdict(stable, found.value, found.error, control, 0, found.negative, reason, found.mode, partial(mode_shape, potential.space))
+    return Verdict(stable, found.value, found.error, control, n, found.negative, reason, found.mode, shape)
 
 
 def mode_shape(space: Space, mode: Array) -> dict[str, Array]:

@@ -24,13 +24,10 @@ from .vtk import (
     Array,
     Revolution,
     _aim,
-    _collection,
     _drawn_circles,
     _extent,
-    _make_folder,
-    _surface_file,
-    remove_surfaces,
     smooth_profile,
+    write_collection,
 )
 
 if TYPE_CHECKING:
@@ -80,20 +77,10 @@ def write_mode_vtk(
         When the name does not end in ``.pvd`` or the folder cannot be written to; for too few frames, an amplitude that is no number, a
         verdict that has no mode, or a mode of another mesh.
     """
-    path = Path(path)
-    if path.suffix != ".pvd":
-        raise InputError("path", str(path), "a name that ends in .pvd is needed; the surfaces go to a folder beside it")
     if isinstance(frames, bool) or not isinstance(frames, (int, np.integer)) or frames < 2:
         raise InputError("frames", frames, "a whole number >= 2 is allowed")
     surface = _ModeSurface(equilibrium, mode, amplitude)
-    files = [_surface_file(path, frame) for frame in range(frames)]
-    _make_folder(files[0].parent)
-    for frame, file in enumerate(files):
-        _write_frame(surface, float(np.cos(2 * np.pi * frame / frames)), file)
-    remove_surfaces(path, keep=len(files))
-    with replace_file(path) as temporary:
-        temporary.write_text(_collection(path, files), encoding="utf-8")
-    return [*files, path]
+    return write_collection(path, frames, lambda frame, file: _write_frame(surface, float(np.cos(2 * np.pi * frame / frames)), file))
 
 
 def render_mode(

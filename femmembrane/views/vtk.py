@@ -12,7 +12,7 @@ A meridian of n nodes is turned about the axis in equal sectors. Points are numb
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -112,14 +112,25 @@ def write_vtk(branch: Branch, path: str | PathLike[str]) -> list[Path]:
     InputError
         When the name does not end in ``.pvd`` or the folder cannot be written to.
     """
+    return write_collection(path, len(branch), lambda step, file: _write_surface(branch[step], smooth_profile(branch[step]), file))
+
+
+def write_collection(path: str | PathLike[str], count: int, write_one: Callable[[int, Path], None]) -> list[Path]:
+    """Write numbered VTU files to a folder beside a PVD file, and the PVD file last; those of an earlier, longer collection are removed.
+
+    Raises
+    ------
+    InputError
+        When the name does not end in ``.pvd`` or the folder cannot be written to.
+    """
     path = Path(path)
     if path.suffix != ".pvd":
         raise InputError("path", str(path), "a name that ends in .pvd is needed; the surfaces go to a folder beside it")
-    files = [_surface_file(path, step) for step in range(len(branch))]
+    files = [_surface_file(path, number) for number in range(count)]
     if files:
         _make_folder(files[0].parent)
-    for equilibrium, file in zip(branch, files, strict=True):
-        _write_surface(equilibrium, smooth_profile(equilibrium), file)
+    for number, file in enumerate(files):
+        write_one(number, file)
     remove_surfaces(path, keep=len(files))
     with replace_file(path) as temporary:
         temporary.write_text(_collection(path, files), encoding="utf-8")

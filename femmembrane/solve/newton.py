@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, BorderedFactor
-from .controls import Control
+from .controls import ArcLengthControl, Control
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
@@ -74,7 +74,8 @@ def correct(
             return NewtonResult(x, pressure, evaluation, None, iteration, np.inf, np.inf, equations.gap, Status.NOT_CONVERGED)
         dx, dp = equations.newton_step()
         size = relative_size(potential, dx, x)
-        done = size <= tolerance
+        close, previously_close = size <= tolerance, previous <= tolerance
+        done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
@@ -111,6 +112,14 @@ class Equations:
         if bordered is None and self.finite:
             bordered = BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
         self.bordered = bordered
+
+    @property
+    def on_control(self) -> bool:
+        """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
+        if isinstance(self.control, ArcLengthControl):
+            return True
+        _, row, corner = self.control.equation(self.potential.space, self.x, self.pressure, self.evaluation)
+        return bool(abs(self.gap) <= 1e-14 * (abs(row @ self.x) + abs(corner * self.pressure)))
 
     def newton_step(self) -> tuple[Array, float]:
         return self._factored.solve(-self.force, -self.gap)

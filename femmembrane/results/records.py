@@ -107,7 +107,6 @@ class Equilibrium:
         s = space.node_parameters() if r is None else _radii(r, space.mesh.breakpoints())
         return _profile(self, s)
 
-    @one_thread
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
@@ -126,14 +125,17 @@ class Equilibrium:
             For an unknown control, or one that does not go with the rest.
         """
         key = (control, azimuthal)
-        gas = gas or self.gas
         if key not in self._verdicts or control == "gas":
-            from ..stability.judge import judge
-
-            evaluation = self.potential.evaluate(self.state, self.pressure)
-            soft = gas.compliance(self.volume) if gas else None
-            self._verdicts[key] = judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=soft)
+            self._verdicts[key] = self._judged(control, azimuthal, gas or self.gas)
         return self._verdicts[key]
+
+    @one_thread
+    def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+        from ..stability.judge import judge
+
+        evaluation = self.potential.evaluate(self.state, self.pressure)
+        compliance = gas.compliance(self.volume) if gas else None
+        return judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:

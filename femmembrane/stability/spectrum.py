@@ -125,7 +125,8 @@ class _Pencil:
             mode, right = self.normalised(mode)
             value, error = self.quotient(mode, right)
             # an absolute floor alone would stop too early on a nearly flat membrane, whose modes are decades softer than the scale
-            if error <= 1e-10 * abs(value) or (error <= 1e-14 * self.scale and error > 0.5 * best):
+            # the error of the value is of second order in that of the mode
+            if error <= 1e-7 * abs(value) or (error <= 1e-14 * self.scale and error > 0.5 * best):
                 return value, mode, error
             best = min(best, error)
             mode = self.solve(self.shifted_solver(value), right)

@@ -11,7 +11,7 @@ same for the Newton corrector (NumPy arrays, banded) and for IPOPT (CasADi funct
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from .discretization.space import HESSIAN_PAIRS, Space, space_of
 from .physics.kinematics import hencky_strains
 from .physics.loads import volume_density
-from .physics.magnetics import magnetic_energy_density
+from .physics.magnetics import Source, magnetic_energy_density
 
 if TYPE_CHECKING:
     from .physics.materials import Material
@@ -74,12 +74,13 @@ class Potential:
         self.scene = scene
         self.space = space_of(scene.mesh, scene.degree) if quadrature is None else Space(scene.mesh, scene.degree, quadrature)
         space = self.space
-        self.sources = scene.sources if scene.susceptibility else ()
+        # a source of no strength is none: nothing of it is built
+        self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
         self._flat = not (space.Z.any() or space.Z_x.any())
         columns = [space.R, space.R_x, space.weights] if self._flat else [space.R, space.R_x, space.weights, space.Z, space.Z_x]
         self.point_data: Array = np.stack([c.ravel() for c in columns])
         with _casadi_answers_numpy():
-            self.symbols, self.terms = _point_expressions(scene, self._flat)
+            self.symbols, self.terms = _point_expressions(scene, self.sources, self._flat)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
 
@@ -123,10 +124,11 @@ class Potential:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales the magnetic energy."""
         space, shape = self.space, self._force_shape
         out = self._kernel(space.at_quadrature(x), np.array([pressure, magnetic]))
-        e, m, v = out[:3].sum(axis=1).tolist()
-        force_density = out[3:11].copy()
-        gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
-        band = space.assemble_band(out[11:21].reshape(-1, space.n_elements))
+        with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy NaN is the answer, and the caller's to judge
+            e, m, v = out[:3].sum(axis=1).tolist()
+            force_density = out[3:11].copy()
+            gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
+            band = space.assemble_band(out[11:21].reshape(-1, space.n_elements))
         return Evaluation(e, m, v, gradient, volume_gradient, band, out[21:23].copy(), force_density)
 
     def distance_to_sources(self, x: Array) -> float:
@@ -137,6 +139,11 @@ class Potential:
         u, _, w, _ = space.at_quadrature(x).reshape(4, *space.R.shape)
         rho, eta = np.append(space.R + u, 0.0), np.append(space.Z + w, space.center_height(x))
         return float(min(np.sqrt(source.distance_squared(rho, eta).min()) for source in self.sources))
+
+    def passed_source(self, before: Array, after: Array) -> bool:
+        """Whether the pole went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
+        heights = self.space.center_height(before), self.space.center_height(after)
+        return any(source.passed(*heights) for source in self.sources)
 
     def compressed(self, evaluation: Evaluation) -> tuple[float, float] | None:
         """Interval of reference radii with meridional compression, where the Legendre-Hadamard condition fails; None without."""
@@ -326,7 +333,7 @@ def _potential_of(scene: Scene) -> Potential:
     return Potential(scene)
 
 
-def _point_expressions(scene: Scene, flat: bool) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
+def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
     """Symbols (data, local, parameters) and the weighted densities with their gradients at one point."""
     data = ca.SX.sym("data", 3 if flat else 5)
     local = ca.SX.sym("local", 4)
@@ -344,8 +351,8 @@ def _point_expressions(scene: Scene, flat: bool) -> tuple[tuple[ca.SX, ca.SX, ca
     hessian = area * (ca.mtimes([slopes.T, tangent, slopes]) + bending)
     volume = weight * volume_density(R + u, R_x + u_x, Z + w)
     magnetic = ca.SX(0)
-    if scene.sources and scene.susceptibility:
-        magnetic = area * magnetic_energy_density(scene.sources, scene.susceptibility, R + u, Z + w)
+    if sources and scene.susceptibility:
+        magnetic = area * magnetic_energy_density(sources, scene.susceptibility, R + u, Z + w)
         magnetic = parameters[1] * magnetic
         second, first = ca.hessian(magnetic, local)
         gradient, hessian = gradient + first, hessian + second

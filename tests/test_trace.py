@@ -88,7 +88,7 @@ def test_a_continued_trace_is_the_uninterrupted_one_to_the_last_bit(tmp_path):
 
 
 def test_trace_through_sharp_turns_below_a_strong_dipole():
-    """M = 600, h = -3.5 down to pole height -0.5: V/(2 pi) has local extremes 0.0333 and 0.0514 (THEORY.md's scene, stated to 3 digits)."""
+    """M = 600, h = -3.5 down to pole height -0.5: V/(2 pi) has local extremes 0.0333 and 0.0514 (recorded on 2026-11-22)."""
     scene = disc_scene(OGDEN, (600.0, -3.5), elements=64)
     branch = fm.trace(scene, start=fm.equilibrium(scene, center_height=1.0), until={"center_height": -0.5}, direction=-1)
     folds = [p.volume / (2 * np.pi) for p in branch.special_points if p.kind == "volume_fold"]

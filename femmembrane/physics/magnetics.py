@@ -29,6 +29,9 @@ class Source(Protocol):
     def distance_squared(self, rho: Any, eta: Any) -> Any:
         """Squared distance from the source, where the field is singular."""
 
+    def passed(self, before: float, after: float) -> bool:
+        """Whether a point on the axis that moved between two heights went through the source."""
+
 
 @dataclass(frozen=True)
 class Dipole:
@@ -76,6 +79,9 @@ class Dipole:
     def distance_squared(self, rho: Any, eta: Any) -> Any:
         """Squared distance from the source, where the field is singular."""
         return rho**2 + (eta - self.height) ** 2
+
+    def passed(self, before: float, after: float) -> bool:
+        return (before - self.height) * (after - self.height) <= 0
 
 
 def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any]:

@@ -124,6 +124,14 @@ class Equilibrium:
         InputError
             For an unknown control, or one that does not go with the rest.
         """
+        if not isinstance(control, str | None) or not isinstance(azimuthal, (int, np.integer)):
+            raise InputError(
+                "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
+                control or azimuthal,
+                "a name and a number are allowed",
+            )
+        if gas is not None and control != "gas":
+            raise InputError("gas", gas, 'allowed with control "gas" only')
         key = (control, azimuthal)
         if key not in self._verdicts or control == "gas":
             self._verdicts[key] = self._judged(control, azimuthal, gas or self.gas)

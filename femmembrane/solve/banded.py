@@ -65,12 +65,6 @@ def band_product(band: Array, half_bandwidth: int, x: Array) -> Array:
     return blas.dsbmv(half_bandwidth, 1.0, band[half_bandwidth : 2 * half_bandwidth + 1], x)
 
 
-def cholesky_exists(band: Array, half_bandwidth: int) -> bool:
-    """Whether a symmetric band matrix in LAPACK general storage is positive definite."""
-    _, info = lapack.dpbtrf(band[half_bandwidth : 2 * half_bandwidth + 1])
-    return bool(info == 0)
-
-
 def negative_directions(band: Array, half_bandwidth: int, constraint: Array | None = None, compliance: float = 0.0) -> int:
     """Number of negative eigenvalues of K, of K restricted to ``constraint . x = 0``, or of K + constraint constraint^T/compliance.
 

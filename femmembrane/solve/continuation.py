@@ -115,6 +115,8 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
         return None, result.iterations, 0.5
     miss = np.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
     state = State.of(result)
+    if potential.passed_source(point.state.x, state.x):
+        return None, result.iterations, 0.5
     # the border of this control is the tangent before: the corrector's last factors give the new one for a back-substitution
     new = _normalised(potential, state, point.sigma, *result.bordered.solve(np.zeros_like(state.x), 1.0)) if result.bordered else None
     if new is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,7 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment
-from .start import spherical_dome, start_at_volume
+from .start import flat_state, spherical_dome, start_at_volume
 from .state import Path, State, distance
 
 #: volumes of the domes from which branches and deflated iterations set out
@@ -43,6 +44,8 @@ class Search:
 
     def run(self) -> None:
         """Trace the branches through the starts, then deflate until nothing new appears."""
+        if self.load == 0 and not self.potential.sources:
+            self._add(flat_state(self.potential))
         for volume in STARTS:
             try:
                 state = start_at_volume(self.potential, volume)
@@ -61,7 +64,8 @@ class Search:
                 self._points.append(segment.b)
                 volumes.append(segment.b.state.volume)
                 if segment.crosses(self.quantity, self.load):
-                    self._add(segment.crossing(self.quantity, self.load).state)
+                    with suppress(SolveError):  # through the flat unloaded state there is no path
+                        self._add(segment.crossing(self.quantity, self.load).state)
                 if abs(volumes[-1]) > FAR:
                     break
         self.traced.append((min(volumes), max(volumes)))

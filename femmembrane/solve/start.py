@@ -19,6 +19,8 @@ from .stepping import march
 
 #: below this volume a membrane with sources is reached from here: turning sources on at the flat state starts from a singular Hessian
 START_VOLUME = 0.5
+#: distance to a source, over R0, below which a start that fails has run into it
+NEAR = 0.2
 #: from this volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
 SAFE_VOLUME = 10.0
 
@@ -49,21 +51,28 @@ def start_at_volume(potential: Potential, volume: float) -> State:
         When the path ends before the full strength of the sources, or a dome cannot be inflated to the volume.
     """
     magnetic = bool(potential.sources)
+    failure: SolveError | None = None
     if magnetic and abs(volume) < START_VOLUME:
         # from the side of the wanted volume first, so that a mirrored scene takes the mirrored path
         side = float(np.copysign(START_VOLUME, volume))
-        try:
-            return march(potential, start_at_volume(potential, side), VolumeControl, side, volume)[-1]
-        except SolveError:
-            return march(potential, start_at_volume(potential, -side), VolumeControl, -side, volume)[-1]
+        for first in (side, -side):
+            try:
+                return march(potential, start_at_volume(potential, first), VolumeControl, first, volume)[-1]
+            except SolveError as error:
+                failure = failure or error
+        if volume == 0:  # nowhere to turn the sources on but at the flat state itself
+            raise failure or SolveError("no start was found", status=Status.NO_EQUILIBRIUM)
     state = _inflated(potential, volume)
     if not magnetic:
         return state
     try:
         return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1]
     except SolveError as error:
+        touching = potential.distance_to_sources((error.result or [state])[-1].x) < NEAR
         raise SolveError(
-            f"the sources could not be turned on to their full strength at V = {volume:.6g}: {error}", status=Status.NO_EQUILIBRIUM
+            f"the sources could not be turned on to their full strength at V = {volume:.6g}; "
+            f"try another volume or a lower strength ({error})",
+            status=Status.DIPOLE_CONTACT if touching else Status.NO_EQUILIBRIUM,
         ) from error
 
 
@@ -91,8 +100,7 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
     """
     flat = not potential.sources
     if pressure == 0 and flat:
-        result = correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0)
-        return State.of(result)
+        return flat_state(potential)
     # without sources a nearly flat membrane obeys P = 3.34 V^3, and its mirror image carries the opposite pressure
     size = min(START_VOLUME, (abs(pressure) / 4) ** (1 / 3)) if flat else START_VOLUME
     volume = float(np.copysign(size, pressure))
@@ -107,8 +115,15 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
     )
 
 
+def flat_state(potential: Potential) -> State:
+    """The flat, unloaded membrane: an equilibrium without sources, and one without stiffness, which no path leaves or passes."""
+    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0))
+
+
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
+    if height == 0 and not potential.sources:
+        return flat_state(potential)
     state = start_at_volume(potential, float(np.copysign(START_VOLUME, height)))
     here = potential.space.center_height(state.x)
     return march(potential, state, CenterHeightControl, here, height)[-1] if height != here else state

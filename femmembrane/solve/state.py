@@ -51,7 +51,8 @@ class State:
 
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:
     """Mesh-independent inner product of (x, P) and (y, Q): mean over the reference area of the displacements, plus P Q."""
-    return float(x @ band_product(potential.mass, potential.space.half_bandwidth, y)) / potential.area + p * q
+    with np.errstate(over="ignore", invalid="ignore"):  # a prediction may be absurd; whoever asked sees it by the size
+        return float(x @ band_product(potential.mass, potential.space.half_bandwidth, y)) / potential.area + p * q
 
 
 def distance(potential: Potential, x: Array, y: Array) -> float:

@@ -14,6 +14,7 @@ from ..scene import MAX_DEGREE
 from ..solve.controls import PressureControl, VolumeControl
 from ..solve.newton import correct
 from .azimuthal import azimuthal_verdict
+from .spectrum import SpectrumError
 from .verdict import CONTROLS, Verdict, axisymmetric_verdict
 
 #: size of an eigenvalue below which its discretisation error is estimated before its sign is believed
@@ -45,7 +46,10 @@ def judge(
     if not azimuthal and control is None:
         raise InputError("control", control, "one of " + ", ".join(CONTROLS) + " is allowed, or azimuthal=1, 2, ...")
     ask = partial(_verdict, control=control, azimuthal=int(azimuthal), compliance=compliance)
-    verdict = ask(potential, x, pressure, evaluation, guess=guess)
+    try:
+        verdict = ask(potential, x, pressure, evaluation, guess=guess)
+    except SpectrumError as error:  # one verdict that cannot be proved must not cost the run that asked for it
+        return Verdict(None, np.nan, np.nan, control, int(azimuthal), None, f"not decided: {error}")
     if abs(verdict.smallest_eigenvalue) < SMALL:  # never for NaN
         verdict = _with_discretisation_error(verdict, potential, x, pressure, ask)
     return verdict
@@ -79,7 +83,10 @@ def _with_discretisation_error(verdict: Verdict, potential: Potential, x: Array,
     result = correct(finer, held, start, pressure)
     if result.status is not Status.CONVERGED:
         return verdict
-    better = ask(finer, result.x, result.pressure, result.evaluation)
+    try:
+        better = ask(finer, result.x, result.pressure, result.evaluation)
+    except SpectrumError:
+        return verdict
     error = verdict.error + abs(better.smallest_eigenvalue - verdict.smallest_eigenvalue)
     if not abs(verdict.smallest_eigenvalue) <= error:
         return replace(verdict, error=error)

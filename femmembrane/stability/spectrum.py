@@ -19,7 +19,7 @@ from ..potential import Array
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
 
 #: a gap below the eigenvalue found, relative to it, in which inertia must find nothing
-_GAP = 1e-6
+_GAP = 1e-4
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,8 @@ def smallest_eigenvalue(
     SpectrumError
         When neither method yields an eigenvalue with a proof by inertia.
     """
+    if constraint is not None and compliance == 0 and band.shape[1] < 2:
+        raise SpectrumError("one unknown under one constraint leaves nothing to perturb")
     pencil = _Pencil(band, mass, half_bandwidth, constraint, compliance)
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.rayleigh(start)

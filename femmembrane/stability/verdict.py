@@ -32,7 +32,7 @@ class Verdict:
     Attributes
     ----------
     stable : bool or None
-        None when the smallest eigenvalue is zero within its error: a marginal state.
+        None when the smallest eigenvalue is zero within its error, a marginal state, or (with NaN) could not be proved to be one.
     smallest_eigenvalue : float
         lambda of K phi = lambda M phi, a squared natural frequency in units of mu/(rho_m R0^2); NaN where no eigenvalue has a meaning.
     error : float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl,
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
 from ..solve.search import Limit, beyond_limit
-from ..solve.start import START_VOLUME, start_at_height, start_at_pressure, start_at_volume
+from ..solve.start import START_VOLUME, flat_state, start_at_height, start_at_pressure, start_at_volume
 from ..solve.state import Path, State
 from ..solve.stepping import Corrector, march
 from ..threads import one_thread
@@ -126,9 +126,10 @@ def equilibrium(
     if gas is not None:
         return _in_gas(scene, gas, start)
     ((control, load),) = given.items()
-    if np.ndim(load):
-        raise InputError(control, load, "one number is allowed")
-    value = _loads(control, [load])
+    key = {"height": "center_height"}.get(control, control)
+    if np.ndim(load) or not isinstance(load, (int, float, np.number)) or isinstance(load, bool) or not np.isfinite(load):
+        raise InputError(key, load, "one finite number is allowed")
+    value = np.array([float(load)])
     return _follow(scene, control, value, start, solver, True, None)[0]
 
 
@@ -145,7 +146,7 @@ def run(scene: Scene, on_step: OnStep | None = None) -> Branch:
         raise InputError("run", None, 'a [run] table is required, for instance control = "volume", start = 0.5, stop = 75.0, steps = 60')
     asked = scene.run
     if asked.control == "arc-length":
-        return trace(scene, start=asked.start or 0.0, until=asked.until, max_steps=asked.max_steps, throw=False, on_step=on_step)
+        return trace(scene, start=cast(float, asked.start), until=asked.until, max_steps=asked.max_steps, throw=False, on_step=on_step)
     return _follow(scene, asked.control, asked.loads(), None, asked.solver, False, on_step, asked.at_limit)
 
 
@@ -179,7 +180,7 @@ def _follow(
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
     status, message = Status.CONVERGED, ""
-    walk = _Walk(scene, potential, control, _SOLVERS[solver], start)
+    walk = _Walk(potential, control, _SOLVERS[solver], start)
     for index, load in enumerate(loads):
         clock = time.perf_counter()
         try:
@@ -231,7 +232,7 @@ class _Turn:
 class _Walk:
     """From load to load under one control, with the memory that predicts the next state."""
 
-    def __init__(self, scene: Scene, potential: Potential, control: str, corrector: Corrector, start: Equilibrium | None) -> None:
+    def __init__(self, potential: Potential, control: str, corrector: Corrector, start: Equilibrium | None) -> None:
         self.potential, self.control_at, self.cold = potential, _CONTROLS[control], _STARTS[control]
         self.quantity, self.corrector = control, corrector if control in _MINIMISED else correct
         self.path = Path()
@@ -247,8 +248,11 @@ class _Walk:
     def to(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """The state at a load, and where the branch turned back if it had to be left for it."""
         turn = None
-        if self.state is None:
-            self.state = self._first(load)
+        if self.state is None or self._flat(self.state.x):
+            # the flat unloaded membrane has no stiffness that a path could leave it by
+            self.state, self.path = self._first(load), Path()
+        elif load == 0 and not self.potential.sources:
+            self.state, self.path = flat_state(self.potential), Path()
         elif load != self.load:
             try:
                 states = march(self.potential, self.state, self.control_at, self.load, load, path=self.path, corrector=self.corrector)
@@ -261,6 +265,9 @@ class _Walk:
                 self.state, self.path = turn.limit.landing, Path()
         self.load = load
         return self.state, turn
+
+    def _flat(self, x: Array) -> bool:
+        return not self.potential.sources and not x.any()
 
     def _first(self, load: float) -> State:
         guess = self.cold(self.potential, load)

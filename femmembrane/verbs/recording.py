@@ -20,6 +20,8 @@ OnStep = Callable[[int, int, Equilibrium], None]
 
 def resume(potential: Potential, start: Equilibrium) -> State:
     """The solver's state of a recorded equilibrium, of this scene or of one with the same mesh and degree."""
+    if not isinstance(start, Equilibrium):
+        raise InputError("start", start, "an Equilibrium is allowed")
     if start.state.shape != (potential.space.n_free,):
         raise InputError("start", start, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     result = correct(potential, VolumeControl(start.volume), start.state, start.pressure)

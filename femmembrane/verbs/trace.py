@@ -46,9 +46,10 @@ def trace(
     scene : Scene
     start : float, Equilibrium or Branch
         A volume, an equilibrium of this scene, or a traced branch to be continued (its points are part of the result, and the new
-        ones are those of an uninterrupted trace to the last bit).
+        ones are those of an uninterrupted trace to the last bit; it keeps its own direction, step and search for special points).
     until : mapping, optional
-        Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it.
+        Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it. The
+        start itself does not count, and what lies behind it is met, if at all, on a distant part of the branch: see ``direction``.
     direction : {1, -1}
         1 sets out towards larger volume.
     max_steps : int
@@ -89,6 +90,8 @@ def trace(
 
 
 def _targets(until: Mapping[str, float] | None) -> dict[str, float]:
+    if until is not None and not isinstance(until, Mapping):
+        raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
     targets = dict(until or {})
     for quantity, value in targets.items():
         if quantity not in QUANTITIES:
@@ -130,10 +133,18 @@ class _Tracing:
         tracer = Tracer(Path(), steps.first, steps)
         special: list[SpecialPoint] | None = [] if special_points else None
         if isinstance(start, Branch):
+            if direction != 1 or potential_of(start.scene) is not potential:
+                raise InputError(
+                    "start", "a Branch", "a branch of this scene is allowed, to be continued the way it was going (direction=1)"
+                )
             return cls._continued(scene, potential, start, tracer, on_step, max_steps)
         if isinstance(start, Equilibrium):
             state = resume(potential, start)
         elif isinstance(start, (int, float, np.number)) and not isinstance(start, bool) and np.isfinite(start):
+            if start == 0 and not potential.sources:
+                raise InputError(
+                    "start", start, "the flat unloaded membrane has no stiffness to start from; a small volume is allowed, such as 1e-3"
+                )
             state = start_at_volume(potential, float(start))
         else:
             raise InputError("start", start, "a volume, an Equilibrium or a traced Branch is allowed")

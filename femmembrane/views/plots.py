@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -162,8 +163,13 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
 
 
 def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
-    """Write a figure (nothing for None) whole or not at all, and return it."""
+    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes."""
     if path is not None:
+        formats = figure.canvas.get_supported_filetypes()
+        if Path(path).suffix[1:].lower() not in formats:
+            raise InputError(
+                "path", str(path), "a name that ends in one of these is needed: " + ", ".join(f".{f}" for f in sorted(formats))
+            )
         with replace_file(path) as temporary:
             figure.savefig(temporary, dpi=_DPI)
     return figure

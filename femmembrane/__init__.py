@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .verbs import pressurize as pressurize
     from .verbs import run as run
     from .verbs import trace as trace
+    from .verbs import trace_iter as trace_iter
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
     from .views.modes import render_mode as render_mode
@@ -61,7 +62,7 @@ _ROOMS = {
     "stability.jacobi": ("jacobi_test", "legendre_test"),
     "stability.verdict": ("Verdict",),
     "verbs.folds": ("Cusp", "FoldCurve"),
-    "verbs": ("Equilibria", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace"),
+    "verbs": ("Equilibria", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace", "trace_iter"),
     "views.modes": ("render_mode", "write_mode_vtk"),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}

@@ -63,6 +63,19 @@ def test_until_is_met_exactly():
     assert first[-1].pressure == 1.6  # met before the volume
 
 
+def test_a_branch_is_an_iterator_while_it_runs():
+    """Stopped by the loop that looks at it; the same points as the whole trace."""
+    scene = disc_scene(OGDEN, elements=16)
+    seen = []
+    for eq in fm.trace_iter(scene, start=0.5):
+        seen.append(eq)
+        if eq.pressure < seen[max(len(seen) - 2, 0)].pressure:  # past the first limit point
+            break
+    whole = fm.trace(scene, start=0.5, until={"volume": seen[-1].volume + 1.0})
+    assert [eq.pressure for eq in seen] == [eq.pressure for eq in whole[: len(seen)]]
+    assert len(list(fm.trace_iter(scene, start=0.5, max_steps=5))) == 6
+
+
 def test_direction_and_start():
     scene = disc_scene(OGDEN, elements=16)
     there = fm.trace(scene, start=0.5, until={"volume": 4.0})

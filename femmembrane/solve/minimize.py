@@ -45,9 +45,16 @@ class NlpFunctions:
 
 
 def minimize(
-    potential: Potential, control: Control, x: Array, pressure: float, *, magnetic: float = 1.0, max_iterations: int = 200
+    potential: Potential,
+    control: Control,
+    x: Array,
+    pressure: float,
+    *,
+    magnetic: float = 1.0,
+    max_iterations: int = 200,
+    evaluation: Evaluation | None = None,
 ) -> tuple[Array, float, int, str]:
-    """Minimise E at a volume, or E - P V at a pressure, from a guess.
+    """Minimise E at a volume, or E - P V at a pressure, from a guess, at which the ``evaluation`` may be known already.
 
     Returns
     -------
@@ -58,7 +65,7 @@ def minimize(
     status : str
         IPOPT's own return status, kept for the record.
     """
-    evaluation = potential.evaluate(x, pressure, magnetic)
+    evaluation = evaluation or potential.evaluate(x, pressure, magnetic)
     scale_u, scale_w = (float(np.abs(x[index]).max(initial=0.0)) or 1.0 for index in potential.space.fields)
     scales = np.empty_like(x)
     scales[potential.space.fields[0]], scales[potential.space.fields[1]] = scale_u, scale_w
@@ -110,9 +117,12 @@ def minimize_and_verify(
     NewtonResult
         Status NOT_A_MINIMUM when forces balance but the second variation has a negative direction under this control.
     """
-    if not np.isfinite(potential.evaluate(x, pressure, magnetic).energy):  # outside the domain of the energy: nothing to scale by
+    evaluation = potential.evaluate(x, pressure, magnetic)
+    if not np.isfinite(evaluation.energy):  # outside the domain of the energy: nothing to scale by
         return correct(potential, control, x, pressure, magnetic=magnetic)
-    found, p, iterations, _ = minimize(potential, control, x, pressure, magnetic=magnetic, max_iterations=max_iterations)
+    found, p, iterations, _ = minimize(
+        potential, control, x, pressure, magnetic=magnetic, max_iterations=max_iterations, evaluation=evaluation
+    )
     if not (np.isfinite(found).all() and np.isfinite(p)):
         found, p = x, pressure
     result = correct(potential, control, found, p, magnetic=magnetic)

@@ -8,3 +8,4 @@ from .follow import run as run
 from .search import Equilibria as Equilibria
 from .search import equilibria as equilibria
 from .trace import trace as trace
+from .trace import trace_iter as trace_iter

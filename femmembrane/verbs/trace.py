@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,18 +75,56 @@ def trace(
         The latter carries the branch up to the failure as ``result``.
     """
     targets = _targets(until)
+    tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)
+    status, message = tracing.follow(targets, ill_posed)
+    branch = tracing.branch(status, message)
+    if throw and message and (until is not None or status is not Status.STEP_LIMIT):
+        raise SolveError(message, status=status, result=branch)
+    return branch
+
+
+def trace_iter(
+    scene: Scene,
+    *,
+    start: float | Equilibrium = 0.5,
+    direction: int = 1,
+    max_steps: int = 400,
+    steps: StepControl | None = None,
+    ill_posed: str = "stop",
+) -> Iterator[Equilibrium]:
+    """The equilibria of :func:`trace` one by one, as they are found: a loop may look at each and stop when it likes.
+
+    The iterator ends where the branch does, or after ``max_steps``; special points are not located.
+    """
+    tracing = _begin(scene, start, direction, steps, False, None, max_steps, ill_posed)
+    yield tracing.found[0]
+    advance, known = one_thread(tracing.advance), 1
+    end = None
+    while end is None:
+        end = advance({}, ill_posed)
+        if len(tracing.found) > known:
+            known = len(tracing.found)
+            yield tracing.found[-1]
+
+
+@one_thread
+def _begin(
+    scene: Scene,
+    start: float | Equilibrium | Branch,
+    direction: int,
+    steps: StepControl | None,
+    special_points: bool,
+    on_step: OnStep | None,
+    max_steps: int,
+    ill_posed: str,
+) -> _Tracing:
     if direction not in (1, -1):
         raise InputError("direction", direction, "1 (towards larger volume) or -1 is allowed")
     if ill_posed not in ("stop", "mark"):
         raise unknown_name("ill_posed", str(ill_posed), ("stop", "mark"))
     if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
         raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
-    tracing = _Tracing.begin(scene, start, direction, steps or StepControl(), special_points, on_step, int(max_steps))
-    status, message = tracing.follow(targets, ill_posed)
-    branch = tracing.branch(status, message)
-    if throw and message and (until is not None or status is not Status.STEP_LIMIT):
-        raise SolveError(message, status=status, result=branch)
-    return branch
+    return _Tracing.begin(scene, start, direction, steps or StepControl(), special_points, on_step, int(max_steps))
 
 
 def _targets(until: Mapping[str, float] | None) -> dict[str, float]:
@@ -114,6 +152,8 @@ class _Tracing:
     on_step: OnStep | None
     max_steps: int
     regular: int = 0
+    made: int = 0
+    points: Iterator[BranchPoint] | None = None
     unexplained: list[str] = field(default_factory=list)
     timings: dict[str, float] = field(default_factory=lambda: {"setup": 0.0, "solve": 0.0, "special_points": 0.0, "verdicts": 0.0})
 
@@ -173,37 +213,49 @@ class _Tracing:
 
     def follow(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str]:
         """Step until a target is met or the branch ends; the status, and a message unless a target was met."""
-        points = trace_points(self.potential, self.point, self.tracer)
-        for _ in range(self.max_steps):
-            clock = time.perf_counter()
-            try:
-                new = next(points)
-            except SolveError as error:
-                return self._ended(error)
-            self.timings["solve"] += time.perf_counter() - clock
-            segment = Segment(self.potential, self.point, new)
-            met = [segment.crossing(q, v) for q, v in targets.items() if segment.crosses(q, v)]
-            last = min(met, key=lambda p: p.sigma) if met else None
-            if self.special is not None:
-                self._look_for_special_points(segment, last)
-            self.add(last or new, clock)
-            if self.special is not None:
-                self._look_for_onsets(segment, last or new)
-            if last is not None:
-                return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
-            self.point, self.regular = new, len(self.found)
-            where = self.potential.compressed(new.state.evaluation)
-            if where is not None and ill_posed == "stop":
-                return Status.LEGENDRE_FAILURE, (
-                    f"at pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g}) the "
-                    f"meridional stress is compressive at {interval(*where)}: the Legendre-Hadamard condition fails "
-                    "there, and what a mesh finds beyond depends on the mesh"
-                )
-            if self._contact(new):
-                return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
-        if self.unexplained:
-            return Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained)
-        return Status.STEP_LIMIT, f"{self.max_steps} steps were made without meeting {dict(targets) or 'an end'}"
+        while (end := self.advance(targets, ill_posed)) is None:
+            pass
+        return end
+
+    def advance(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str] | None:
+        """One step: None to go on, else how the trace ended. What was found before a failure is kept."""
+        if self.made == self.max_steps:
+            if self.unexplained:
+                return Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained)
+            return Status.STEP_LIMIT, f"{self.max_steps} steps were made without meeting {dict(targets) or 'an end'}"
+        self.made += 1
+        try:
+            return self._step(targets, ill_posed)
+        except SolveError as error:
+            return self._ended(error)
+
+    def _step(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str] | None:
+        clock = time.perf_counter()
+        if self.points is None:
+            self.points = trace_points(self.potential, self.point, self.tracer)
+        new = next(self.points)
+        self.timings["solve"] += time.perf_counter() - clock
+        segment = Segment(self.potential, self.point, new)
+        met = [segment.crossing(q, v) for q, v in targets.items() if segment.crosses(q, v)]
+        last = min(met, key=lambda p: p.sigma) if met else None
+        if self.special is not None:
+            self._look_for_special_points(segment, last)
+        self.add(last or new, clock)
+        if self.special is not None:
+            self._look_for_onsets(segment, last or new)
+        if last is not None:
+            return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
+        self.point, self.regular = new, len(self.found)
+        where = self.potential.compressed(new.state.evaluation)
+        if where is not None and ill_posed == "stop":
+            return Status.LEGENDRE_FAILURE, (
+                f"at pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g}) the "
+                f"meridional stress is compressive at {interval(*where)}: the Legendre-Hadamard condition fails "
+                "there, and what a mesh finds beyond depends on the mesh"
+            )
+        if self._contact(new):
+            return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
+        return None
 
     def add(self, point: BranchPoint, clock: float) -> None:
         solved = time.perf_counter()

@@ -46,8 +46,8 @@ def test_state(problem):
     assert eq.center_height == pytest.approx(expected["center_height"], rel=1e-5)
 
 
-#: where 1e-6 is missed, and what holds instead (1.37e-6 recorded on 2026-11-22). A soft state (lambda_pressure 3.2) near the dipole amplifies the discretisation error of
-#: order 4; no quadrature changes it, 128 elements leave 8.8e-8. Of the energy E = 133.9 as a whole it is 1.3e-8.
+#: where 1e-6 is missed, and what holds instead (1.37e-6 recorded on 2026-11-22). A soft state (lambda_pressure 3.2) near the dipole
+#: amplifies the discretisation error of order 4; no quadrature changes it, 128 elements leave 8.8e-8. Of the whole energy it is 1.3e-8.
 MISSED = {"dipole_above-4.7-pressure": 1.5e-6}
 
 

@@ -128,7 +128,7 @@ def _compute(scene: Scene, interrupts: _Interrupts) -> tuple[Branch, int, str]:
             interrupts.check()
         except (KeyboardInterrupt, SolveError) as error:
             if interrupts.caught or not isinstance(error, SolveError):
-                return partial_branch(scene, found, Status.NOT_CONVERGED, "interrupted"), INTERRUPTED, "interrupted"
+                return partial_branch(scene, found, Status.INTERRUPTED, "interrupted"), INTERRUPTED, "interrupted"
             return partial_branch(scene, found, error.status, str(error)), NOT_CONVERGED, _explain(error.status, str(error))
     if branch.status == Status.CONVERGED:
         return branch, DONE, ""

@@ -123,7 +123,7 @@ def test_trace_stops_where_the_legendre_condition_fails():
     assert np.isnan(last.verdict("volume").smallest_eigenvalue)
     assert all(eq.status is fm.Status.CONVERGED for eq in branch[:-1])
     with pytest.raises(fm.SolveError, match="Legendre") as raised:
-        fm.trace(scene, start=2.1, until={"center_height": 0.0}, direction=-1)
+        fm.trace(scene, start=2.1, until={"center_height": 0.0}, direction=-1, throw=True)
     assert len(raised.value.result) == len(branch)
 
 

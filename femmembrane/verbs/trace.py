@@ -36,7 +36,7 @@ def trace(
     steps: StepControl | None = None,
     special_points: bool = True,
     ill_posed: str = "stop",
-    throw: bool = True,
+    throw: bool = False,
     on_step: OnStep | None = None,
 ) -> Branch:
     """Follow a branch by arc length, stable or not, through limit points and folds.
@@ -61,7 +61,8 @@ def trace(
         What to do where the meridional stress is compressive, so that the Legendre-Hadamard condition fails and the plain membrane
         has no mesh-independent equilibria: end there, or go on with that status on every such state.
     throw : bool
-        Raise when the branch ends before ``until`` is met; otherwise return it with its status and message.
+        Raise when the branch ends before ``until`` is met. A branch that ends is a result, so by default it is returned, with the
+        reason in its status and message.
     on_step : callable, optional
         Called with (index, total, equilibrium) after each step.
 
@@ -72,7 +73,7 @@ def trace(
     Raises
     ------
     InputError, SolveError
-        The latter carries the branch up to the failure as ``result``.
+        The latter when the start cannot be reached, and for ``throw``: then it carries the branch as ``result``.
     """
     targets = _targets(until)
     tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)

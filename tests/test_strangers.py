@@ -4,6 +4,10 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.potential import potential_of
+from femmembrane.solve.controls import VolumeControl
+from femmembrane.solve.start import start_at_volume
+from femmembrane.solve.stepping import march
 
 from .cases import OGDEN, disc_scene
 
@@ -106,3 +110,11 @@ def test_wrong_arguments_are_named(call, key, tmp_path, monkeypatch):
         call(fm.equilibrium(PLAIN, volume=1.0))
     assert raised.value.key == key
     assert list(tmp_path.iterdir()) == []
+
+
+def test_inflating_without_the_source_may_pass_where_it_will_be():
+    """Cold starts inflate first and turn sources on afterwards: a source is no obstacle while it is off."""
+    potential = potential_of(disc_scene(fm.NeoHookean(), (1e-3, 3.0), elements=16))
+    small = start_at_volume(potential_of(disc_scene(fm.NeoHookean(), elements=16)), 10.0)
+    last = march(potential, small, VolumeControl, 10.0, 60.0, magnetic=0.0)[-1]
+    assert potential.space.center_height(last.x) > 3.0

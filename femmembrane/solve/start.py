@@ -60,8 +60,8 @@ def start_at_volume(potential: Potential, volume: float) -> State:
                 return march(potential, start_at_volume(potential, first), VolumeControl, first, volume)[-1]
             except SolveError as error:
                 failure = failure or error
-        if volume == 0:  # nowhere to turn the sources on but at the flat state itself
-            raise failure or SolveError("no start was found", status=Status.NO_EQUILIBRIUM)
+        if volume == 0 and failure is not None:  # nowhere to turn the sources on but at the flat state itself
+            raise failure
     state = _inflated(potential, volume)
     if not magnetic:
         return state

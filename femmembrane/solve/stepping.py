@@ -82,7 +82,7 @@ def march(
             initial=0.0
         ):
             new = State.of(result, spent - result.iterations)
-            if parameter == "load" and potential.passed_source(accepted[-1].x, new.x):
+            if parameter == "load" and magnetic and potential.passed_source(accepted[-1].x, new.x):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"
                 raise SolveError(message, status=Status.DIPOLE_CONTACT, result=accepted)
             path.append(there, new.x, new.pressure, *_slope(potential, new, control_at(there), parameter, there))

@@ -22,7 +22,7 @@ from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from ..solve.banded import band_product
 from .azimuthal import AzimuthalOperator, _compression, azimuthal_operator, azimuthal_shape, lowest_eigenvalues
-from .spectrum import SpectrumError, _Pencil
+from .spectrum import Pencil, SpectrumError
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def natural_frequencies(
     except SpectrumError as error:
         raise SolveError(f"no natural frequencies: {error}", status=Status.NOT_CONVERGED) from error
     constraint = evaluation.volume_gradient if n == 0 and control == "volume" else None
-    pencil = _Pencil(operator.band, operator.mass, operator.half_bandwidth, constraint, 0.0)
+    pencil = Pencil(operator.band, operator.mass, operator.half_bandwidth, constraint, 0.0)
     shape = partial(_shape_at_nodes, potential, operator.n)
     vibrations = []
     for _, mode in found:

@@ -64,7 +64,7 @@ def smallest_eigenvalue(
     """
     if constraint is not None and compliance == 0 and band.shape[1] < 2:
         raise SpectrumError("one unknown under one constraint leaves nothing to perturb")
-    pencil = _Pencil(band, mass, half_bandwidth, constraint, compliance)
+    pencil = Pencil(band, mass, half_bandwidth, constraint, compliance)
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.rayleigh(start)
     if found is None or pencil.below(found[0]) > 0:
@@ -79,7 +79,9 @@ def smallest_eigenvalue(
     return SmallestEigenvalue(value, mode, negative, error)
 
 
-class _Pencil:
+class Pencil:
+    """K - lambda M with its constraint: factors, inertia and iterations at any shift."""
+
     def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float) -> None:
         self.band, self.mass, self.kd, self.constraint, self.compliance = band, mass, kd, constraint, compliance
         self.n = int(band.shape[1])

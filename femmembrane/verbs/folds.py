@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolveError, Status, unknown_name
+from ..errors import InputError, SolveError, Status
 from ..potential import Family
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
@@ -21,6 +21,7 @@ from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_
 from ..solve.parameter import Parameter
 from ..solve.state import State
 from ..threads import one_thread
+from .arguments import check_ill_posed, check_max_steps
 from .recording import record
 from .trace import CONTACT
 
@@ -201,10 +202,8 @@ def fold_curve(
     """
     named = Parameter(scene, parameter)
     low, high = _bounds(named, bounds, direction)
-    if ill_posed not in ("stop", "mark"):
-        raise unknown_name("ill_posed", str(ill_posed), ("stop", "mark"))
-    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
-        raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
+    check_ill_posed(ill_posed)
+    check_max_steps(max_steps)
     clock = time.perf_counter()
     family = Family(scene, named.vary)
     _check_start(start, family)

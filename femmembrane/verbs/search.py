@@ -13,6 +13,7 @@ from ..results.records import Equilibrium
 from ..scene import Scene
 from ..solve.search import STARTS, Search
 from ..threads import one_thread
+from .arguments import check_max_steps
 from .recording import record
 
 
@@ -80,8 +81,7 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     ((control, load),) = given.items()
     if isinstance(load, bool) or not isinstance(load, (int, float, np.number)) or not np.isfinite(load):
         raise InputError(control, load, "a finite number is allowed")
-    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
-        raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
+    check_max_steps(max_steps)
     potential = potential_of(scene)
     search = Search(potential, control, float(load), max_steps)
     search.run()

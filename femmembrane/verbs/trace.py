@@ -19,6 +19,7 @@ from ..solve.state import Path
 from ..stability.azimuthal import azimuthal_eigenvalue
 from ..stability.verdict import interval
 from ..threads import one_thread
+from .arguments import check_ill_posed, check_max_steps
 from .recording import OnStep, record, resume
 
 #: distance to a source at which the membrane counts as touching it
@@ -121,10 +122,8 @@ def _begin(
 ) -> _Tracing:
     if direction not in (1, -1):
         raise InputError("direction", direction, "1 (towards larger volume) or -1 is allowed")
-    if ill_posed not in ("stop", "mark"):
-        raise unknown_name("ill_posed", str(ill_posed), ("stop", "mark"))
-    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
-        raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
+    check_ill_posed(ill_posed)
+    check_max_steps(max_steps)
     return _Tracing.begin(scene, start, direction, steps or StepControl(), special_points, on_step, int(max_steps))
 
 

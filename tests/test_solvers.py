@@ -175,3 +175,29 @@ def test_failure_is_reported_whole():
     outside = np.zeros(potential.space.n_free)
     outside[potential.space.fields[0]] = -2.0
     assert correct(potential, VolumeControl(1.0), outside, 0.0).status is fm.Status.NOT_CONVERGED
+
+
+@pytest.mark.parametrize("volume", [1e-12, 1e-9, 1e-3, 0.1, 3.0])
+def test_dome_is_a_sphere_down_to_the_smallest_volumes(volume):
+    """Of a flat dome of height H the radial displacement is 2 H^2 (s - s^3)/3 to first order: far below round-off of the radius."""
+    potential = potential_of(disc_scene(fm.NeoHookean(), elements=16, degree=4))
+    s = np.linspace(0.1, 0.9, 9)
+    u, _, w, _ = potential.space.evaluate(spherical_dome(potential, volume), s)
+    height = 2 * np.sinh(np.arcsinh(3 * volume / np.pi) / 3)
+    radius = (1 + height**2) / (2 * height)
+    if volume < 1e-6:
+        np.testing.assert_allclose(u, 2 * height**2 * (s - s**3) / 3, rtol=1e-6)
+        np.testing.assert_allclose(w, height * (1 - s**2), rtol=1e-6)
+    else:
+        np.testing.assert_allclose((s + u) ** 2 + (w - height + radius) ** 2, radius**2, rtol=1e-6)
+        np.testing.assert_allclose(s + u, radius * np.sin(2 * np.arctan(height) * s), rtol=1e-6)
+
+
+@pytest.mark.parametrize("damped", [True, False])
+def test_nearly_flat_cold_starts_take_a_handful_of_iterations(damped):
+    """From the dome Newton converges at once at any small volume, whatever its last digits (40 iterations and failures recorded before)."""
+    potential = potential_of(disc_scene(fm.NeoHookean()))
+    for volume in 10 ** np.random.default_rng(0).uniform(-10, -6, 40):
+        result = correct(potential, VolumeControl(volume), spherical_dome(potential, volume), 0.0, magnetic=0.0, damped=damped)
+        assert result.status is fm.Status.CONVERGED
+        assert result.iterations <= 6

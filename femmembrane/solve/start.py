@@ -37,9 +37,16 @@ def spherical_dome(potential: Potential, volume: float) -> Array:
         return np.zeros(space.n_free)
     radius = (1 + height**2) / (2 * height)
     angle = 2 * np.arctan(height)
-    rho = radius * np.sin(angle * s)
+    u = radius * (_sine_excess(angle * s) - s * _sine_excess(np.asarray(angle)))  # radius sin(angle s) - s, for radius sin(angle) = 1
     eta = 2 * radius * np.sin(angle * (1 + s) / 2) * np.sin(angle * (1 - s) / 2)
-    return space.interpolate(rho - s, eta)
+    return space.interpolate(u, eta)
+
+
+def _sine_excess(x: Array) -> Array:
+    """sin x - x without cancellation: the radial displacement of a nearly flat dome is far below round-off of its radius."""
+    square = x**2
+    series = -x * square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
+    return np.where(square < 0.1, series, np.sin(x) - x)
 
 
 def start_at_volume(potential: Potential, volume: float) -> State:

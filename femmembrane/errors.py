@@ -22,6 +22,7 @@ class Status(StrEnum):
     DIPOLE_CONTACT = "dipole contact"
     NOT_A_MINIMUM = "not a minimum"
     LEGENDRE_FAILURE = "Legendre condition fails"
+    SLACK = "slack"
     STEP_LIMIT = "step limit"
     UNEXPLAINED_INERTIA = "unexplained change of inertia"
     INTERRUPTED = "interrupted"
@@ -41,7 +42,10 @@ _ADVICE = {
     Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",
     Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",
     Status.INTERRUPTED: "what was computed is kept; continue from there",
-    Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh",
+    Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh; "
+    "a tension field (effects.tension_field = true) wrinkles instead",
+    Status.SLACK: "the tension field ends here: where no tension is left along the meridian the membrane folds onto itself; "
+    "a finer mesh comes closer to the fold, not past it",
 }
 
 

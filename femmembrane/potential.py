@@ -25,6 +25,7 @@ from .discretization.space import HESSIAN_PAIRS, Space, space_of
 from .physics.kinematics import hencky_strains
 from .physics.loads import volume_density
 from .physics.magnetics import Source, magnetic_energy_density
+from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
     from .physics.materials import Material
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: compression, relative to the largest stress, from which the Legendre-Hadamard condition counts as failed
-COMPRESSION = 1e-8
 #: points evaluated in one go; larger vectors leave the processor's cache
 _BLOCK = 1024
 
@@ -83,6 +82,11 @@ class Potential:
             self.symbols, self.terms = _point_expressions(scene, self.sources, self._flat)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
+
+    @property
+    def material(self) -> Material:
+        """The strain energy of the membrane: the scene's material, or its tension field."""
+        return strain_energy(self.scene.material, self.scene.tension_field)
 
     @cached_property
     def mass(self) -> Array:
@@ -145,14 +149,6 @@ class Potential:
         heights = self.space.center_height(before), self.space.center_height(after)
         return any(source.passed(*heights) for source in self.sources)
 
-    def compressed(self, evaluation: Evaluation) -> tuple[float, float] | None:
-        """Interval of reference radii with meridional compression, where the Legendre-Hadamard condition fails; None without."""
-        bad = evaluation.stress[0] < -COMPRESSION * np.abs(evaluation.stress).max(initial=0.0)
-        if not bad.any():
-            return None
-        r = self.space.R.ravel()[bad]
-        return float(r.min()), float(r.max())
-
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
         space = self.space
@@ -174,7 +170,7 @@ class Potential:
     def _response_function(self) -> ca.Function:
         e = ca.SX.sym("e", 2)
         with _casadi_answers_numpy():
-            stress, tangent = _response(self.scene.material, e)
+            stress, tangent = _response(self.material, e)
         return _point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
 
     def field_energy(self, rho: Array, eta: Array) -> Array:
@@ -342,7 +338,8 @@ def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> t
     u, u_x, w, w_x = (local[k] for k in range(4))
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
-    stress, tangent = _response(scene.material, ca.vertcat(e1, e2))
+    material = strain_energy(scene.material, scene.tension_field)
+    stress, tangent = _response(material, ca.vertcat(e1, e2))
     # the chain rule through closed-form stresses keeps the digits that differentiating the energy would lose at small strain, and
     # written out it takes half the operations of differentiating the composition
     slopes = ca.jacobian(ca.vertcat(e1, e2), local)
@@ -357,7 +354,7 @@ def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> t
         second, first = ca.hessian(magnetic, local)
         gradient, hessian = gradient + first, hessian + second
     return (data, local, parameters), {
-        "elastic": area * scene.material.energy(e1, e2),
+        "elastic": area * material.energy(e1, e2),
         "magnetic": magnetic,
         "volume": volume,
         "gradient": gradient,

@@ -7,6 +7,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [membrane]                   attributes of Scene, listed in SCENE_KEYS
     [[source]]  kind, ...        a class of SOURCES and its arguments
     [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
+    [effects]                    attributes of Scene that are on or off
     [run]                        Run
     [analysis]                   Analysis
 
@@ -43,7 +44,11 @@ AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
 VERDICTS = ("pressure", "volume")
 QUANTITIES = ("volume", "pressure", "center_height")
-SCENE_KEYS: dict[str, tuple[str, ...]] = {"membrane": ("susceptibility", "radius_to_thickness"), "mesh": ("degree",)}
+SCENE_KEYS: dict[str, tuple[str, ...]] = {
+    "membrane": ("susceptibility", "radius_to_thickness"),
+    "mesh": ("degree",),
+    "effects": ("tension_field",),
+}
 
 MAX_DEGREE = 8
 _MAX_STEPS = 400
@@ -206,6 +211,8 @@ class Scene:
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
     radius_to_thickness : float
         R0/T > 0; enters the total stresses only.
+    tension_field : bool
+        Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
     title : str
     run : Run, optional
         Equilibria that :func:`femmembrane.run` computes.
@@ -223,6 +230,7 @@ class Scene:
     sources: tuple[Source, ...] = ()
     susceptibility: float | None = None
     radius_to_thickness: float = 1000.0
+    tension_field: bool = False
     title: str = ""
     run: Run | None = None
     analysis: Analysis = field(default_factory=Analysis)
@@ -240,6 +248,7 @@ class Scene:
             sources=sources,
             susceptibility=_optional(_susceptibility, "membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_number("membrane.radius_to_thickness", self.radius_to_thickness, positive, above=0),
+            tension_field=_switch("effects.tension_field", self.tension_field),
             title=_text("title", self.title),
         )
         self._check_sources()
@@ -285,6 +294,7 @@ class Scene:
             "run": _arguments(self.run) if self.run else {},
             "analysis": _arguments(self.analysis),
         }
+        tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
         if self.run and self.run.control != "arc-length":
             del tables["run"]["max_steps"]
         plain: dict[str, Any] = _plain(tables)
@@ -483,6 +493,12 @@ def _whole(key: str, value: Any, *, most: int | None = None) -> int:
 
 def _susceptibility(key: str, value: Any) -> float:
     return _number(key, value, "a finite number >= 0 is allowed (2.5 in the paper)", least=0)
+
+
+def _switch(key: str, value: Any) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(key, value, "true or false is allowed")
+    return bool(value)
 
 
 def _text(key: str, value: Any) -> str:

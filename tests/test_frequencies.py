@@ -156,7 +156,7 @@ def test_meridional_compression_is_refused_for_all() -> None:
     s = potential.space.interpolation_points()
     x = potential.space.interpolate(0.3 * s * (1 - s), 0 * s)
     for n in (0, 2):
-        with pytest.raises(SolveError, match=r"meridional stress compressive at r in \[0\.\d+, 0\.993\]"):
+        with pytest.raises(SolveError, match=r"meridional stress (is )?compressive at r in \[0\.\d+, 0\.993\]"):
             natural_frequencies(potential, x, 0.0, n)
 
 

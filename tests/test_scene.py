@@ -189,7 +189,8 @@ REFUSED = [
     # tables and keys
     ({}, "material.model", "missing; known: neo-hookean, ogden"),
     (plain(materal={}), "materal", "did you mean 'material'"),
-    (plain(effects={"tension_field": False}), "effects", "unknown"),
+    (plain(effects={"tension_feild": True}), "effects.tension_feild", "did you mean 'tension_field'?"),
+    (plain(effects={"tension_field": 1}), "effects.tension_field", "true or false"),
     (plain(elements=4), "elements", "belongs in [mesh]"),
     (plain(title=3), "title", "text"),
     (plain(title="\ud800"), "title", "text"),

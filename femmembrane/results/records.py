@@ -351,7 +351,7 @@ def _profile(eq: Equilibrium, s: Array) -> dict[str, Array]:
     e1 = meridional_strain(R_s, Z_s, u_s, w_s)
     e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
     rho, eta = R + u, Z + w
-    mechanical = scene.material.stress(e1, e2)
+    mechanical = eq.potential.material.stress(e1, e2)
     sources = scene.sources
     h = magnetic_field(sources, rho, eta) if sources else (0.0, 0.0)
     slope = np.hypot(R_s + u_s, Z_s + w_s)

@@ -110,7 +110,8 @@ class Parameter:
                 _Scaled(_unchecked(s, strength=1.0), value) if name == "strength" else _unchecked(s, **{name: value}) for s in sources
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
-        return SimpleNamespace(material=material, sources=sources, susceptibility=susceptibility, mesh=scene.mesh, degree=scene.degree)
+        parts = {"material": material, "sources": sources, "susceptibility": susceptibility}
+        return SimpleNamespace(**parts, mesh=scene.mesh, degree=scene.degree, tension_field=scene.tension_field)
 
     def _check_modulus(self, value: float, alpha: float) -> None:
         if not 0 < value * alpha < 2:

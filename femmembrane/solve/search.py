@@ -16,6 +16,7 @@ from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment
 from .start import flat_state, spherical_dome, start_at_volume
 from .state import Path, State, distance
+from .wellposed import ill_posed
 
 #: volumes of the domes from which branches and deflated iterations set out
 STARTS = (0.5, -0.5, 5.0, -5.0, 50.0, -50.0)
@@ -81,10 +82,10 @@ class Search:
         return False
 
     def _add(self, state: State) -> bool:
-        """Keep a state unless it is known; one that is compressed is a folded shape of this mesh, remembered only to be avoided."""
+        """Keep a state unless it is known; one that is ill-posed is a folded shape of this mesh, remembered only to be avoided."""
         if self._known(state.x):
             return False
-        well_posed = self.potential.compressed(state.evaluation) is None
+        well_posed = ill_posed(self.potential, state.evaluation) is None
         (self.states if well_posed else self.ill_posed).append(state)
         return well_posed
 

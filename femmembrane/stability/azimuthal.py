@@ -34,8 +34,10 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
-from ..potential import COMPRESSION, Array, Potential
+from ..physics.tension_field import natural_strains
+from ..potential import Array, Potential
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from ..solve.wellposed import unsupported
 from ..threads import one_thread
 from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
 from .verdict import Verdict, verdict_from
@@ -149,6 +151,9 @@ def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Arr
     one evaluation at t = 1/sqrt 3 is a Gauss rule of two points.
     """
     close = np.abs(d) < EQUAL_STRETCH
+    if potential.scene.tension_field:  # where one stress is gone, the difference is odd but not smooth, and has no digits to lose
+        _, _, taut1, taut2 = natural_strains(e1, e2)
+        close &= taut1 == taut2
     quotient: Array = difference / np.where(close, 1.0, d)
     if close.any():
         mean, half = (e1 + e2)[close] / 2, d[close] / np.sqrt(12)
@@ -498,7 +503,7 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     """
     _check_waves(n, 1)
     operator = azimuthal_operator(potential, x, pressure, n)
-    wrinkles = _compression(operator)
+    wrinkles = short_waves(potential, operator)
     if wrinkles:
         return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
     found = _smallest(operator, guess)
@@ -506,13 +511,18 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     return verdict_from(found, among, None, operator.n, partial(azimuthal_shape, potential.space, operator.n))
 
 
-def _compression(operator: AzimuthalOperator) -> str:
-    """Where a principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails; empty if nowhere."""
-    r, R = operator.response, operator.space.R
-    limit = -COMPRESSION * max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
+def short_waves(potential: Potential, operator: AzimuthalOperator) -> str:
+    """Where ever shorter waves have ever lower eigenvalues at this n; empty if nowhere.
+
+    A principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails. In a tension field no stress is; there the
+    meridional one may vanish, while without hoop stress the operator of one n is as good as any.
+    """
+    r, R, relaxed = operator.response, operator.space.R, potential.scene.tension_field
+    scale = max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
     found = []
     for name, stress, lines in (("meridional", r.s1, "circles"), ("hoop", r.s2, "meridians")):
-        bad = R[stress < limit]
-        if bad.size:
-            found.append(f"{name} stress compressive at r in [{bad.min():.3g}, {bad.max():.3g}]: wrinkles along {lines}")
+        bad = R[unsupported(stress, scale, relaxed)]
+        if bad.size and not (relaxed and name == "hoop"):
+            what = "vanishes" if relaxed else "compressive"
+            found.append(f"{name} stress {what} at r in [{bad.min():.3g}, {bad.max():.3g}]: wrinkles along {lines}")
     return "; ".join(found)

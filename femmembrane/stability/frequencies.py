@@ -21,7 +21,8 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from ..solve.banded import band_product
-from .azimuthal import AzimuthalOperator, _compression, azimuthal_operator, azimuthal_shape, lowest_eigenvalues
+from ..solve.wellposed import ill_posed
+from .azimuthal import azimuthal_operator, azimuthal_shape, lowest_eigenvalues, short_waves
 from .spectrum import Pencil, SpectrumError
 
 
@@ -97,9 +98,10 @@ def natural_frequencies(
     """
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(x, pressure)
-    where = _short_waves(operator, potential.compressed(evaluation))
+    bad = ill_posed(potential, evaluation)
+    where = short_waves(potential, operator) if operator.n else str(bad or "")  # a hoop stress sets no axisymmetric wave in motion
     if where:
-        raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=Status.LEGENDRE_FAILURE)
+        raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=bad.status if bad else Status.LEGENDRE_FAILURE)
     try:
         found = lowest_eigenvalues(potential, x, pressure, n, count, control)
     except SpectrumError as error:
@@ -113,13 +115,6 @@ def natural_frequencies(
         mode.flags.writeable = False
         vibrations.append(Vibration(value, error_bound, operator.n, None if n else control, mode, shape))
     return tuple(vibrations)
-
-
-def _short_waves(operator: AzimuthalOperator, meridional: tuple[float, float] | None) -> str:
-    """Where the Legendre-Hadamard condition fails; a hoop stress sets no axisymmetric wave in motion."""
-    if operator.n:
-        return _compression(operator)
-    return "" if meridional is None else f"meridional stress compressive at r in [{meridional[0]:.3g}, {meridional[1]:.3g}]"
 
 
 def _shape_at_nodes(potential: Potential, n: int, mode: Array) -> dict[str, Array]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..potential import Evaluation, Potential
+from ..solve.wellposed import ill_posed
 from .spectrum import SmallestEigenvalue, smallest_eigenvalue
 
 Array = NDArray[np.float64]
@@ -90,12 +91,9 @@ def axisymmetric_verdict(
         raise (
             unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
         )
-    where = potential.compressed(evaluation)
-    if where is not None:
-        reason = (
-            f"short-wave unstable: the meridional stress is compressive at {interval(*where)}, where the "
-            "Legendre-Hadamard condition fails and the spectrum has no lower bound under refinement"
-        )
+    bad = ill_posed(potential, evaluation)
+    if bad is not None:
+        reason = f"short-wave unstable: {bad}, and the spectrum has no lower bound under refinement"
         return Verdict(False, np.nan, np.nan, control, 0, None, reason)
     if control == "gas" and compliance is None:
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
@@ -122,8 +120,3 @@ def mode_shape(space: Space, mode: Array) -> dict[str, Array]:
     s = space.node_parameters()
     u, _, w, _ = space.evaluate(mode, s)
     return {"r": space.mesh.position(s)[0], "u": u, "w": w}
-
-
-def interval(low: float, high: float) -> str:
-    """Reference radii in words."""
-    return f"r = {low:.3g}" if f"{low:.3g}" == f"{high:.3g}" else f"r in [{low:.3g}, {high:.3g}]"

@@ -16,6 +16,7 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Family
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
+from ..solve import wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
 from ..solve.parameter import Parameter
@@ -254,9 +255,9 @@ class _Following:
             self.add(new)
             if new.number in self.bounds:
                 return Status.CONVERGED, "", False
-            where = self.system.family.compressed(new.evaluation)
-            if where is not None and ill_posed == "stop":
-                return Status.LEGENDRE_FAILURE, self._ill_posed(where), False
+            bad = wellposed.ill_posed(self.system.family, new.evaluation)
+            if bad is not None and ill_posed == "stop":
+                return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh", False
             if self._clearance(new) < CONTACT:
                 return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at {self._place(new)}", False
             point = new
@@ -292,13 +293,6 @@ class _Following:
 
     def _place(self, point: FoldPoint) -> str:
         return f"{self.parameter.name} = {point.number:.6g} (V = {point.evaluation.volume:.6g}, P = {point.pressure:.6g})"
-
-    def _ill_posed(self, where: tuple[float, float]) -> str:
-        eq = self.found[-1]
-        return (
-            f"at V = {eq.volume:.6g}, P = {eq.pressure:.6g} the meridional stress is compressive at r in [{where[0]:.3g}, {where[1]:.3g}]: "
-            "the Legendre-Hadamard condition fails there, and what a mesh finds beyond depends on the mesh"
-        )
 
     def curve(self, status: Status, message: str, closed: bool) -> FoldCurve:
         values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in self.found])

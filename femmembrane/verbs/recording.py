@@ -12,6 +12,7 @@ from ..scene import Scene
 from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import correct
 from ..solve.state import State
+from ..solve.wellposed import ill_posed
 from ..stability.judge import judge
 from ..stability.verdict import Verdict
 
@@ -49,6 +50,7 @@ def record(
     for control, n in [*asked, *((None, n) for n in scene.analysis.azimuthal_modes)]:
         guess = previous.verdict(control, azimuthal=n).coefficients if previous is not None else None
         verdicts[control, n] = judge(potential, state.x, state.pressure, state.evaluation, control, n, guess=guess)
+    bad = ill_posed(potential, state.evaluation)
     coefficients = state.x.copy()
     coefficients.flags.writeable = False
     return Equilibrium(
@@ -59,7 +61,7 @@ def record(
         magnetic_energy=state.evaluation.magnetic_energy,
         residual=float(state.residual),
         iterations=state.iterations,
-        status=state.status if potential.compressed(state.evaluation) is None else Status.LEGENDRE_FAILURE,
+        status=state.status if bad is None else bad.status,
         scene=scene,
         state=coefficients,
         seconds=0.0 if clock is None else time.perf_counter() - clock,

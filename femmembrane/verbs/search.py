@@ -92,6 +92,6 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     searched = (
         f"searched: {len(search.traced)} traced stretch(es) ({spans}), starts at V = {', '.join(f'{v:g}' for v in STARTS)}, "
         f"{search.deflations} deflated solves ({search.iterations} iterations)"
-        + (f"; {len(search.ill_posed)} compressed state(s) left out, whose shape depends on the mesh" if search.ill_posed else "")
+        + (f"; {len(search.ill_posed)} ill-posed state(s) left out, whose shape depends on the mesh" if search.ill_posed else "")
     )
     return Equilibria(control, float(load), tuple(found[k] for k in order), tuple(float(energies[k]) for k in order), searched)

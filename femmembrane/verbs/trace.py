@@ -12,12 +12,12 @@ from ..errors import InputError, SolveError, Status, unknown_name
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
+from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
 from ..solve.start import start_at_volume
 from ..solve.state import Path
 from ..stability.azimuthal import azimuthal_eigenvalue
-from ..stability.verdict import interval
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps
 from .recording import OnStep, record, resume
@@ -246,13 +246,10 @@ class _Tracing:
         if last is not None:
             return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
         self.point, self.regular = new, len(self.found)
-        where = self.potential.compressed(new.state.evaluation)
-        if where is not None and ill_posed == "stop":
-            return Status.LEGENDRE_FAILURE, (
-                f"at pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g}) the "
-                f"meridional stress is compressive at {interval(*where)}: the Legendre-Hadamard condition fails "
-                "there, and what a mesh finds beyond depends on the mesh"
-            )
+        bad = wellposed.ill_posed(self.potential, new.state.evaluation)
+        if bad is not None and ill_posed == "stop":
+            where = f"pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g})"
+            return bad.status, f"at {where} {bad}, and what a mesh finds beyond depends on the mesh"
         if self._contact(new):
             return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
         return None

@@ -1,0 +1,70 @@
+"""Tension field: the strain energy of a membrane that wrinkles rather than carry compression (Pipkin 1986, Steigmann 1990).
+
+A strip of an isotropic incompressible material in simple tension has the natural width lambda^(-1/2). Where a membrane is narrower than
+that it wrinkles across, at no cost, and its mean energy is that of simple tension; where both stretches are below 1 it is slack. With
+Hencky strains, and x+ the positive part of x, all of this is the energy at the *natural strains*::
+
+    n_1 = max(e_1, -e_2+/2),   n_2 = max(e_2, -e_1+/2)            W*(e_1, e_2) = W(n_1, n_2)
+
+    taut             n_1 = e_1,    n_2 = e_2        W
+    hoop wrinkled    n_1 = e_1,    n_2 = -e_1/2     stress along the meridian alone
+    meridian wrinkled n_1 = -e_2/2, n_2 = e_2       stress around the axis alone
+    slack            n_1 = n_2 = 0                  no energy, no stress
+
+W* is the relaxation (quasiconvex envelope) of W where the Baker-Ericksen inequalities hold; a term of the potential that depends on the
+position alone, like the magnetic one, passes through the relaxation, so this relaxes the whole potential at a given pressure. W* is once
+continuously differentiable; its second derivatives jump across the borders of the zones. Nothing is smoothed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .materials import Material
+
+
+@dataclass(frozen=True)
+class TensionField:
+    """The relaxed energy W* of a material; itself a :class:`~.materials.Material`.
+
+    In a taut membrane every number is that of the material, to the last bit.
+
+    Parameters
+    ----------
+    material : Material
+        Any isotropic incompressible strain energy.
+    """
+
+    material: Material
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        n1, n2, _, _ = natural_strains(e1, e2)
+        return self.material.energy(n1, n2)
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        n1, n2, taut1, taut2 = natural_strains(e1, e2)
+        s1, s2 = self.material.stress(n1, n2)
+        return taut1 * s1, taut2 * s2  # at natural width the stress across is zero: here exactly
+
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+        n1, n2, taut1, taut2 = natural_strains(e1, e2)
+        s11, s12, s22 = self.material.tangent(n1, n2)
+        # in simple tension d(s_1)/d(e_1) = s_11 - s_12/2
+        return taut1 * (s11 - (1 - taut2) * s12 / 2), taut1 * taut2 * s12, taut2 * (s22 - (1 - taut1) * s12 / 2)
+
+
+def natural_strains(e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
+    """Natural strains (n_1, n_2), and whether the membrane is taut along each direction.
+
+    Written with products of truth values, not with minima and maxima, so that a NaN stays one: a state outside the domain of the
+    energy may not pass for a slack one.
+    """
+    least1, least2 = -(e2 > 0) * e2 / 2, -(e1 > 0) * e1 / 2
+    taut1, taut2 = e1 >= least1, e2 >= least2
+    return taut1 * e1 + (1 - taut1) * least1, taut2 * e2 + (1 - taut2) * least2, taut1, taut2
+
+
+def strain_energy(material: Material, tension_field: bool) -> Material:
+    """The strain energy that a membrane follows: the material's own, or its relaxation."""
+    return TensionField(material) if tension_field else material

@@ -1,0 +1,61 @@
+"""Where the equations of a membrane are ill-posed: what a mesh finds there depends on the mesh.
+
+The plain membrane is in compression along the meridian: the Legendre-Hadamard condition fails. In a tension field no stress is
+compressive, but where the meridional one vanishes nothing holds the meridian against the pressure: it folds on a circle there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Status
+from ..potential import Array, Evaluation, Potential
+
+#: stress relative to the largest one that counts as none
+NO_STRESS = 1e-8
+
+
+@dataclass(frozen=True)
+class IllPosed:
+    """Interval of reference radii in which a membrane is compressed, or slack in a tension field."""
+
+    low: float
+    high: float
+    slack: bool
+
+    @property
+    def status(self) -> Status:
+        return Status.SLACK if self.slack else Status.LEGENDRE_FAILURE
+
+    @property
+    def where(self) -> str:
+        return interval(self.low, self.high)
+
+    def __str__(self) -> str:
+        if self.slack:
+            return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there"
+        return f"the meridional stress is compressive at {self.where}: the Legendre-Hadamard condition fails there"
+
+
+def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
+    """Where the state of an evaluation is ill-posed; None where it is nowhere."""
+    slack = potential.scene.tension_field
+    scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
+    bad = unsupported(evaluation.stress[0], scale, slack)
+    if not bad.any():
+        return None
+    r = potential.space.R.ravel()[bad]
+    return IllPosed(float(r.min()), float(r.max()), slack)
+
+
+def unsupported(stress: Array, scale: float, tension_field: bool) -> NDArray[np.bool_]:
+    """Whether a principal stress is compressive, or in a tension field absent."""
+    return stress < (NO_STRESS if tension_field else -NO_STRESS) * scale
+
+
+def interval(low: float, high: float) -> str:
+    """Reference radii in words."""
+    return f"r = {low:.3g}" if f"{low:.3g}" == f"{high:.3g}" else f"r in [{low:.3g}, {high:.3g}]"

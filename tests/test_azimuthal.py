@@ -199,7 +199,7 @@ def _surface_energies(potential: Potential, x: np.ndarray, mode: np.ndarray, n: 
     c12 = sum(f * g for f, g in zip(along, around, strict=True)) / (J * R)
     mean, radius = (c11 + c22) / 2, np.hypot((c11 - c22) / 2, c12)
     weights = space.weights[..., None] / len(angle)
-    elastic = potential.scene.material.energy(np.log(mean + radius) / 2, np.log(mean - radius) / 2)
+    elastic = potential.material.energy(np.log(mean + radius) / 2, np.log(mean - radius) / 2)
     magnetic = potential.field_energy(np.hypot(rho, theta), z + 0 * theta)[0].reshape(elastic.shape)
     volume = z * (along[0] * around[1] - along[1] * around[0])
     return np.array([(weights * R * J * elastic).sum(), (weights * R * J * magnetic).sum(), (weights * volume).sum()])

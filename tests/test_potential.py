@@ -17,6 +17,7 @@ SCENES = {
     "neo-hookean": disc_scene(fm.NeoHookean(), elements=6),
     "ogden": disc_scene(OGDEN, elements=6, degree=3),
     "dipole": disc_scene(OGDEN, (600.0, -3.25), elements=6),
+    "tension field": disc_scene(OGDEN, (600.0, -3.25), elements=6).replace(tension_field=True),
     "two dipoles": disc_scene(OGDEN, (200.0, 5.0), elements=6).replace(sources=[fm.Dipole(200, 5.0), fm.Dipole(90, -3.0, orientation=-1)]),
 }
 

@@ -289,7 +289,9 @@ class _Following:
         near = self._clearance(point)
         if near < 50 * CONTACT:
             return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
-        return error.status, str(error)
+        wrinkled = self.system.family.scene.tension_field and not point.evaluation.stress.all()
+        hint = "; where zones of wrinkles end a tension field has no third derivatives, which this needs: trace at each value instead"
+        return error.status, f"{error}{hint if wrinkled else ''}"
 
     def _place(self, point: FoldPoint) -> str:
         return f"{self.parameter.name} = {point.number:.6g} (V = {point.evaluation.volume:.6g}, P = {point.pressure:.6g})"

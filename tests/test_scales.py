@@ -13,12 +13,17 @@ from scipy.constants import mu_0
 import femmembrane as fm
 from femmembrane.errors import InputError
 from femmembrane.physics.scales import UNITS
+from femmembrane.potential import potential_of
+from femmembrane.solve.parameter import Parameter
+
+from .cases import OGDEN, disc_scene
 
 #: R0 = 5 cm, T = 50 um, mu = 0.4 MPa: R0/T = 1000, mu T/R0 = 400 Pa, R0^3 = 1.25e-4 m^3, mu T R0^2 = 0.05 J
-RUBBER = fm.Scales(radius=0.05, thickness=5e-5, shear_modulus=4e5)
+TABLE = {"radius": 0.05, "thickness": 5e-5, "shear_modulus": 4e5}
+RUBBER = fm.Scales(**TABLE)
 #: with mu0 = 4e-7 pi (true to 1e-9): M = 1e-7 m^2/(4 pi R0^6 mu) = 1e-7 144/(4 pi 6.25e-3) for m = 12 A m^2
 MOMENT, STRENGTH = 12.0, 1.8334649444186344e-4
-MAGNET = fm.Scales(radius=0.05, thickness=5e-5, shear_modulus=4e5, dipole_moment=MOMENT)
+MAGNET = fm.Scales(**TABLE, dipole_moment=MOMENT)
 LINEAR = sorted(UNITS.keys() - {"dipole_strength"})
 
 
@@ -100,21 +105,18 @@ def test_scales_are_plain_numbers():
     assert hash(scales) == hash(fm.Scales(1.0, 0.5, 2.0, 3.0))
 
 
-GIVEN = {"radius": 0.05, "thickness": 5e-5, "shear_modulus": 4e5}
-
-
 @pytest.mark.parametrize("value", [0, -1.0, math.nan, math.inf, True, np.True_, "0.05", 10**400, [1.0], 1j])
 @pytest.mark.parametrize("name", ["radius", "thickness", "shear_modulus", "dipole_moment"])
 def test_refused_numbers(name, value):
     with pytest.raises(InputError, match="a finite number > 0 is allowed") as caught:
-        fm.Scales(**{**GIVEN, name: value})
+        fm.Scales(**{**TABLE, name: value})
     assert caught.value.key == f"scales.{name}"
 
 
 @pytest.mark.parametrize("name", ["radius", "thickness", "shear_modulus"])
 def test_none_is_no_scale(name):
     with pytest.raises(InputError, match=rf"scales\.{name} = None"):
-        fm.Scales(**{**GIVEN, name: None})
+        fm.Scales(**{**TABLE, name: None})
 
 
 @pytest.mark.parametrize(
@@ -130,7 +132,7 @@ def test_none_is_no_scale(name):
 )
 def test_units_beyond_floats_are_refused(change, what):
     with pytest.raises(InputError, match=rf"scales = Scales.*({what}).* would be (0|inf)"):
-        fm.Scales(**{**GIVEN, **change})
+        fm.Scales(**{**TABLE, **change})
 
 
 @pytest.mark.parametrize("convert", [RUBBER.to_si, RUBBER.from_si])
@@ -152,3 +154,174 @@ def test_refused_unit():
         RUBBER.units("lenght")
     with pytest.raises(InputError, match=r"scales\.dipole_moment = None"):
         RUBBER.strength  # noqa: B018
+
+
+# --- scenes
+
+PLAIN = fm.Scene(fm.NeoHookean(), mesh=fm.disc(8))
+MAGNETIC = PLAIN.replace(sources=[fm.Dipole(MAGNET.strength, 6.5)], susceptibility=2.5)
+
+
+def tables(*sources, ratio=None, **more):
+    """A scene file with scales, whose keys ``more`` adds to."""
+    membrane = {"susceptibility": 2.5, **({} if ratio is None else {"radius_to_thickness": ratio})}
+    found = [{"kind": "dipole", "height": 6.5, **source} for source in sources]
+    return {"material": {"model": "neo-hookean"}, "membrane": membrane, "source": found, "scales": {**TABLE, **more}}
+
+
+def test_scene_without_scales_is_as_it_was():
+    assert PLAIN.scales is None
+    assert PLAIN.radius_to_thickness == 1000.0
+    assert fm.Scene(fm.NeoHookean(), mesh=fm.disc(8), radius_to_thickness=1000) == PLAIN
+    assert "scales" not in PLAIN.to_dict()
+    assert PLAIN.to_dict()["membrane"] == {"radius_to_thickness": 1000.0}
+
+
+def test_ratio_follows():
+    thick = fm.Scales(radius=0.05, thickness=1e-3, shear_modulus=4e5)
+    scene = fm.Scene(fm.NeoHookean(), scales=thick)
+    assert type(scene.radius_to_thickness) is float
+    assert scene.radius_to_thickness == pytest.approx(50, rel=1e-15)
+    assert scene.to_dict()["scales"] == {"radius": 0.05, "thickness": 1e-3, "shear_modulus": 4e5}
+    assert "membrane" not in scene.to_dict()
+    # in agreement there is one ratio, to the last bit
+    assert fm.Scene(fm.NeoHookean(), scales=thick, radius_to_thickness=50 * (1 + 5e-10)) == scene
+
+
+@pytest.mark.parametrize("ratio", [500, 1000 * (1 + 2e-9), 1000 * (1 - 2e-9)])
+def test_a_ratio_that_contradicts_is_refused(ratio):
+    with pytest.raises(InputError, match=r"scales\.radius / scales\.thickness = 1000; leave radius_to_thickness out") as caught:
+        fm.Scene.from_dict(tables(ratio=ratio))
+    assert (caught.value.key, caught.value.value) == ("membrane.radius_to_thickness", ratio)
+
+
+@pytest.mark.parametrize("ratio", [0, True, "1000"])
+def test_a_ratio_is_a_number_with_scales_too(ratio):
+    with pytest.raises(InputError, match=r"membrane\.radius_to_thickness = .*> 0"):
+        fm.Scene.from_dict(tables(ratio=ratio))
+
+
+def test_ratio_follows_new_scales():
+    thick = fm.Scales(radius=0.05, thickness=1e-3, shear_modulus=4e5)
+    scene = PLAIN.replace(scales=thick)
+    assert scene.radius_to_thickness == thick.radius_to_thickness
+    assert scene.replace(scales=RUBBER).radius_to_thickness == RUBBER.radius_to_thickness
+    assert scene.replace(degree=3).radius_to_thickness == thick.radius_to_thickness
+    assert scene.replace(scales=None).radius_to_thickness == thick.radius_to_thickness
+    with pytest.raises(InputError, match="leave radius_to_thickness out"):
+        scene.replace(scales=RUBBER, radius_to_thickness=50.0)
+
+
+def test_strength_of_a_dipole_left_out():
+    scene = fm.Scene.from_dict(tables({}, dipole_moment=MOMENT))
+    assert scene.scales == MAGNET
+    assert scene.sources == (fm.Dipole(MAGNET.strength, 6.5),)
+    scene = fm.Scene.from_dict(tables({"strength": 3.0}, {"height": -2.0, "orientation": -1}, dipole_moment=MOMENT))
+    assert scene.sources == (fm.Dipole(3.0, 6.5), fm.Dipole(MAGNET.strength, -2.0, -1))
+
+
+def test_no_strength_and_no_moment():
+    for found in (tables({}), {**tables({}), "scales": TABLE}):
+        with pytest.raises(InputError, match=r"source\.strength = None: missing; give it, or scales\.dipole_moment in A m\^2"):
+            fm.Scene.from_dict(found)
+    with pytest.raises(InputError, match=r"source\[1\]\.strength = None: missing; .*scales\.dipole_moment"):
+        fm.Scene.from_dict(tables({"strength": 1.0}, {}))
+    # a misspelt strength is told as such
+    for more in ({}, {"dipole_moment": MOMENT}):
+        with pytest.raises(InputError, match=r"source\.strenght = 1\.0: unknown; did you mean 'strength'"):
+            fm.Scene.from_dict(tables({"strenght": 1.0}, **more))
+
+
+def test_a_moment_beside_strengths_is_that_of_one_of_them():
+    for strength in (MAGNET.strength, MAGNET.strength * (1 + 5e-10)):
+        for others in ((), ({"strength": 3.0},)):
+            scene = fm.Scene.from_dict(tables(*others, {"strength": strength, "height": 4.0}, dipole_moment=MOMENT))
+            assert scene.sources[-1].strength == strength
+    for sources in ((), ({"strength": MAGNET.strength * (1 + 2e-9)},), ({"strength": 200}, {"strength": 3.0})):
+        with pytest.raises(InputError, match=r"its strength, 0\.000183346.*it would do nothing; leave it out") as caught:
+            fm.Scene.from_dict(tables(*sources, dipole_moment=MOMENT))
+        assert (caught.value.key, caught.value.value) == ("scales.dipole_moment", MOMENT)
+    with pytest.raises(InputError, match=r"scales\.dipole_moment"):
+        PLAIN.replace(scales=MAGNET)
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "advice"),
+    [
+        ({}, "scales.radius", "missing; it has no default"),
+        ({"radius": 0.05, "thickness": 5e-5}, "scales.shear_modulus", "missing"),
+        ({**TABLE, "radius": 0}, "scales.radius", "> 0"),
+        ({**TABLE, "thickness": "thin"}, "scales.thickness", "> 0"),
+        ({**TABLE, "shear_modulus": True}, "scales.shear_modulus", "> 0"),
+        ({**TABLE, "dipole_moment": -12.0}, "scales.dipole_moment", "> 0"),
+        ({**TABLE, "shear_moduls": 1.0}, "scales.shear_moduls", "did you mean 'shear_modulus'"),
+        ({**TABLE, "susceptibility": 1.0}, "scales.susceptibility", "belongs in [membrane]"),
+        (0.05, "scales", "a table"),
+    ],
+)
+def test_refused_tables(table, key, advice):
+    with pytest.raises(InputError) as caught:
+        fm.Scene.from_dict({"material": {"model": "neo-hookean"}, "scales": table})
+    assert caught.value.key == key
+    assert advice in caught.value.allowed
+
+
+@pytest.mark.parametrize("value", [1.0, TABLE, fm.Scales])
+def test_refused_in_python(value):
+    with pytest.raises(InputError, match=r"scales = .*Scales\(radius=\.\.\., thickness=\.\.\., shear_modulus=\.\.\.\) is allowed"):
+        fm.Scene(fm.NeoHookean(), scales=value)
+
+
+@given(scales=any_scales, moment=st.none() | decades, other=st.floats(0, 600), written=st.booleans())
+def test_scene_there_and_back(scales, moment, other, written, tmp_path_factory):
+    """With and without a moment, whose strength is written or left out."""
+    given = {"radius": scales.radius, "thickness": scales.thickness, "shear_modulus": scales.shear_modulus}
+    found = tables({"strength": other}, {"height": -2.0}, **given)
+    if moment is None or written:
+        found["source"][1]["strength"] = other if moment is None else scales.from_si("dipole_strength", moment)
+    if moment is not None:
+        found["scales"]["dipole_moment"] = moment
+    scene = fm.Scene.from_dict(found)
+    path = tmp_path_factory.getbasetemp() / "scales.toml"
+    scene.to_toml(path)
+    for back in (fm.Scene.from_dict(scene.to_dict()), fm.Scene.from_toml(path)):
+        assert back == scene
+        assert hash(back) == hash(scene)
+    assert scene.scales.dipole_moment == moment
+
+
+def test_scales_change_no_equilibrium():
+    assert potential_of(PLAIN.replace(scales=RUBBER)) is potential_of(PLAIN)
+    assert potential_of(MAGNETIC.replace(scales=MAGNET)) is potential_of(MAGNETIC)
+
+
+# --- a number of the scene that varies
+
+
+def test_a_moment_goes_when_its_strength_varies():
+    scene = MAGNETIC.replace(scales=MAGNET)
+    strength = Parameter(scene, "source.0.strength")
+    assert strength.scene_at(strength.value) == scene
+    for value in (0.0, 200.0):
+        varied = strength.scene_at(value)
+        assert varied.scales == RUBBER
+        assert varied.sources == (fm.Dipole(value, 6.5),)
+    assert Parameter(scene, "source.0.height").scene_at(5.0).scales == MAGNET
+    assert Parameter(scene, "membrane.susceptibility").scene_at(1.0).scales == MAGNET
+
+
+def test_a_moment_stays_while_another_dipole_has_it():
+    scene = MAGNETIC.replace(sources=[fm.Dipole(3.0, -2.0), *MAGNETIC.sources], scales=MAGNET)
+    assert Parameter(scene, "source.0.strength").scene_at(4.0).scales == MAGNET
+    assert Parameter(scene, "source.1.strength").scene_at(4.0).scales == RUBBER
+
+
+def test_fold_curve_in_the_strength_of_a_moment():
+    """The fold's scenes keep the scales that apply, and a start with the moment of the strength that varies is no obstacle."""
+    scales = fm.Scales(**TABLE, dipole_moment=RUBBER.to_si("dipole_strength", 200.0))
+    scene = disc_scene(OGDEN, (scales.strength, 6.5), elements=8).replace(scales=scales)
+    limit = fm.trace(scene, start=0.5, until={"volume": 12.0}).special_points[0]
+    curve = fm.fold_curve(scene, start=limit, parameter="source.0.strength", bounds=(150.0, 250.0))
+    assert curve.values[-1] == 250.0
+    assert curve.equilibria[0].scene.scales == scales
+    assert curve.equilibria[-1].scene.scales == RUBBER

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 
 import numpy as np
@@ -11,10 +12,13 @@ from hypothesis import strategies as st
 from scipy.constants import mu_0
 
 import femmembrane as fm
+from femmembrane import cli
 from femmembrane.errors import InputError
 from femmembrane.physics.scales import UNITS
 from femmembrane.potential import potential_of
+from femmembrane.results import table
 from femmembrane.solve.parameter import Parameter
+from femmembrane.views import vtk
 
 from .cases import OGDEN, disc_scene
 
@@ -325,3 +329,125 @@ def test_fold_curve_in_the_strength_of_a_moment():
     assert curve.values[-1] == 250.0
     assert curve.equilibria[0].scene.scales == scales
     assert curve.equilibria[-1].scene.scales == RUBBER
+
+
+# --- output in Pa
+
+STRESSES = ("mechanical_stress_1", "mechanical_stress_2", "total_stress_1", "total_stress_2")
+IN_PA = tuple(f"{name}_pa" for name in STRESSES)
+
+
+@pytest.fixture(scope="module")
+def bare() -> fm.Branch:
+    return fm.inflate(MAGNETIC, volumes=[1.0, 2.0])
+
+
+@pytest.fixture(scope="module")
+def scaled() -> fm.Branch:
+    return fm.inflate(MAGNETIC.replace(scales=MAGNET), volumes=[1.0, 2.0])
+
+
+def test_profile_in_pa(bare, scaled):
+    for r in (None, [0.0, 0.3, 1.0]):
+        profile, plain = scaled[1].profile(r), bare[1].profile(r)
+        assert list(profile) == [*plain, *IN_PA]
+        for name in STRESSES:
+            np.testing.assert_array_equal(profile[name], plain[name])
+            np.testing.assert_allclose(profile[f"{name}_pa"], 4e5 * plain[name], rtol=1e-15)
+
+
+def test_total_stress_takes_the_ratio_of_the_scales(bare):
+    """The pressure through the thickness is P T/R0 over mu: p itself, in Pa."""
+    scene = MAGNETIC.replace(scales=fm.Scales(radius=0.05, thickness=1e-3, shear_modulus=4e5))
+    (thick,) = fm.inflate(scene, volumes=[1.0])
+    through = scene.scales.to_si("pressure", thick.pressure), MAGNET.to_si("pressure", bare[0].pressure)
+    for name in ("total_stress_1", "total_stress_2"):
+        expected = 4e5 * bare[0].profile()[name] - through[0] + through[1]
+        np.testing.assert_allclose(thick.profile()[f"{name}_pa"], expected, rtol=1e-12)
+
+
+def test_column(bare, scaled):
+    np.testing.assert_allclose(scaled.column("pressure_pa"), 400.0 * scaled.column("pressure"), rtol=1e-15)
+    assert scaled[:0].column("pressure_pa").shape == (0,)
+    with pytest.raises(InputError, match=r"column = 'pressure_p'.*did you mean 'pressure_pa'"):
+        scaled.column("pressure_p")
+    with pytest.raises(InputError, match=r"column = 'pressure_pa': unknown; did you mean 'pressure'\?") as caught:
+        bare.column("pressure_pa")
+    assert "_pa" not in caught.value.allowed
+
+
+def test_table(bare, scaled, tmp_path):
+    names = table.columns(bare)
+    place = names.index("residual")
+    assert table.columns(scaled) == [*names[:place], "pressure_pa", *names[place:]]
+    table.write_csv(scaled, tmp_path / "branch.csv")
+    with (tmp_path / "branch.csv").open(encoding="utf-8") as file:
+        found = [float(row["pressure_pa"]) for row in csv.DictReader(file)]
+    assert found == scaled.column("pressure_pa").tolist()
+    assert scaled.to_dataframe()["pressure_pa"].tolist() == found
+
+
+def test_netcdf(bare, scaled, tmp_path):
+    import xarray
+
+    scaled.save(tmp_path / "branch.nc")
+    with xarray.open_dataset(tmp_path / "branch.nc", engine="h5netcdf") as dataset:
+        assert set(dataset.variables) - set(bare.to_xarray().variables) == {"pressure_pa", *IN_PA}
+        assert dataset["pressure_pa"].attrs == {"long_name": "pressure p", "units": "Pa"}
+        assert dataset["total_stress_1_pa"].attrs == {"long_name": "meridional total stress", "units": "Pa"}
+        assert {dataset[name].attrs["units"] for name in IN_PA} == {"Pa"}
+        assert {dataset[name].attrs["units"] for name in STRESSES} == {"1"}
+        np.testing.assert_array_equal(dataset["pressure_pa"].values, scaled.column("pressure_pa"))
+        for name in IN_PA:
+            np.testing.assert_array_equal(dataset[name].values, [e.profile()[name] for e in scaled])
+    loaded = fm.load(tmp_path / "branch.nc")
+    assert loaded.scene == scaled.scene
+    assert loaded.column("pressure_pa").tolist() == scaled.column("pressure_pa").tolist()
+
+
+def test_surfaces(bare, scaled, tmp_path):
+    import pyvista
+
+    for branch, name in ((bare, "bare"), (scaled, "scaled")):
+        branch[:1].to_vtk(tmp_path / f"{name}.pvd")
+    plain, grid = (pyvista.read(tmp_path / name / f"{name}_0000.vtu") for name in ("bare", "scaled"))
+    assert set(grid.point_data) - set(plain.point_data) == set(IN_PA)
+    for name in STRESSES:
+        np.testing.assert_allclose(grid.point_data[f"{name}_pa"], 4e5 * plain.point_data[name], rtol=1e-15)
+
+
+def test_rendered(bare, scaled, tmp_path):
+    vtk.render(scaled, tmp_path / "stress.png", quantity="total_stress_1_pa", size=(200, 150))
+    assert (tmp_path / "stress.png").stat().st_size > 0
+    with pytest.raises(InputError, match="total_stress_1_pa") as caught:
+        vtk.render(bare, tmp_path / "none.png", quantity="total_stress_1_pa")
+    assert "_pa" not in caught.value.allowed
+
+
+def test_run_of_a_scene_file(tmp_path):
+    """From a moment in A m^2 to a pressure in Pa: the folder is that of a scene with the strength written out, and two numbers more."""
+    text = """
+        [material]
+        model = "neo-hookean"
+        [membrane]
+        susceptibility = 2.5
+        [scales]
+        radius = 0.05
+        thickness = 5.0e-5
+        shear_modulus = 4.0e5
+        dipole_moment = 12.0
+        [[source]]
+        kind = "dipole"
+        height = 6.5
+        [mesh]
+        elements = 8
+        [run]
+        values = [1.0, 2.0]
+    """
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    assert cli.main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out")]) == 0
+    with (tmp_path / "out" / "branch.csv").open(encoding="utf-8") as file:
+        found = list(csv.DictReader(file))
+    expected = fm.inflate(MAGNETIC, volumes=[1.0, 2.0]).column("pressure")
+    np.testing.assert_allclose([float(row["pressure"]) for row in found], expected, rtol=1e-12)
+    np.testing.assert_allclose([float(row["pressure_pa"]) for row in found], 400.0 * expected, rtol=1e-12)

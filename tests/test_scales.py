@@ -424,6 +424,16 @@ def test_rendered(bare, scaled, tmp_path):
     assert "_pa" not in caught.value.allowed
 
 
+def test_a_trace_continued_with_scales_has_them_from_its_start():
+    """Scales change no equilibrium, so a branch without them may be continued with them; its columns are then those of one scene."""
+    scene = MAGNETIC.replace(scales=MAGNET)
+    half = fm.trace(MAGNETIC, start=1.0, until={"volume": 4.0}, max_steps=4, throw=False)
+    whole = fm.trace(scene, start=half, until={"volume": 4.0})
+    assert len(whole) > len(half)
+    assert {eq.scene for eq in whole} == {p.equilibrium.scene for p in whole.special_points} == {scene}
+    assert whole.to_xarray()["total_stress_1_pa"].shape == (len(whole), 17)  # 8 quadratic elements
+
+
 def test_run_of_a_scene_file(tmp_path):
     """From a moment in A m^2 to a pressure in Pa: the folder is that of a scene with the strength written out, and two numbers more."""
     text = """

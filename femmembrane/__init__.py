@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .physics.magnetics import Dipole as Dipole
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
+    from .physics.scales import Scales as Scales
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
     from .results.records import Jump as Jump
@@ -53,6 +54,7 @@ _ROOMS = {
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.magnetics": ("Dipole",),
     "physics.materials": ("NeoHookean", "Ogden"),
+    "physics.scales": ("Scales",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),
     "solve.continuation": ("StepControl",),

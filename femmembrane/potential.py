@@ -321,7 +321,7 @@ def vectorise(function: ca.Function, n: int) -> ca.Function:
 
 def potential_of(scene: Scene) -> Potential:
     """The potential of a scene, built once: scenes that differ only in what is done with it share one."""
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0))
+    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
 
 
 @lru_cache(maxsize=64)

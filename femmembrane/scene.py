@@ -10,6 +10,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [effects]                    attributes of Scene that are on or off
     [run]                        Run
     [analysis]                   Analysis
+    [scales]                     Scales
 
 A new model, source or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
 Values are checked where the objects are made, so that files and Python code meet the same errors, named by their key in a file.
@@ -35,6 +36,7 @@ from .discretization.meridian import Disc, Meridian, disc
 from .errors import InputError, unknown_name
 from .physics.magnetics import Dipole, Source
 from .physics.materials import Material, NeoHookean, Ogden
+from .physics.scales import AGREEMENT, Scales
 
 MATERIALS: dict[str, Any] = {"neo-hookean": NeoHookean, "ogden": Ogden}
 SOURCES: dict[str, Any] = {"dipole": Dipole}
@@ -50,7 +52,11 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "effects": ("tension_field",),
 }
 
+#: where else an argument without a default may come from, for the message when it is missing
+_OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
+
 MAX_DEGREE = 8
+_RADIUS_TO_THICKNESS = 1000.0
 _MAX_STEPS = 400
 
 
@@ -209,19 +215,22 @@ class Scene:
         Magnetic sources on the axis; none: nothing magnetic is built.
     susceptibility : float, optional
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
-    radius_to_thickness : float
-        R0/T > 0; enters the total stresses only.
+    radius_to_thickness : float, optional
+        R0/T > 0; enters the total stresses only. Left out: that of the scales, or 1000 without scales.
     tension_field : bool
         Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
     title : str
     run : Run, optional
         Equilibria that :func:`femmembrane.run` computes.
     analysis : Analysis
+    scales : Scales, optional
+        Physical size and stiffness: stresses and pressures are then given in Pa as well. They change no equilibrium.
 
     Raises
     ------
     InputError
-        For a value that cannot be used, named by its key in a scene file (``mesh.elements``).
+        For a value that cannot be used, named by its key in a scene file (``mesh.elements``), and for scales that contradict
+        ``radius_to_thickness`` or hold the moment of no dipole.
     """
 
     material: Material
@@ -229,11 +238,12 @@ class Scene:
     degree: int = 2
     sources: tuple[Source, ...] = ()
     susceptibility: float | None = None
-    radius_to_thickness: float = 1000.0
+    radius_to_thickness: float = None  # type: ignore[assignment]  # a float as soon as the scene is made
     tension_field: bool = False
     title: str = ""
     run: Run | None = None
     analysis: Analysis = field(default_factory=Analysis)
+    scales: Scales | None = None
 
     def __post_init__(self) -> None:
         _require("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -241,13 +251,14 @@ class Scene:
         _require("run", self.run, () if self.run is None else ("loads",), "a Run is allowed")
         _require("analysis", self.analysis, ("stability", "azimuthal_modes"), "an Analysis is allowed")
         sources = _sequence("source", self.sources, "a list of sources is allowed, such as [Dipole(strength=..., height=...)]")
-        positive = "a finite number > 0 is allowed (R0 over the reference thickness)"
+        scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
+        _require("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
         _convert(
             self,
             degree=_whole("mesh.degree", self.degree, most=MAX_DEGREE),
             sources=sources,
             susceptibility=_optional(_susceptibility, "membrane.susceptibility", self.susceptibility),
-            radius_to_thickness=_number("membrane.radius_to_thickness", self.radius_to_thickness, positive, above=0),
+            radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=_switch("effects.tension_field", self.tension_field),
             title=_text("title", self.title),
         )
@@ -268,13 +279,22 @@ class Scene:
             raise InputError(
                 "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"
             )
+        if self.scales is not None and not self.scales.fits(self.sources):
+            raise InputError(
+                "scales.dipole_moment",
+                self.scales.dipole_moment,
+                f"no dipole of the scene has its strength, {self.scales.strength:.12g}, so it would do nothing; leave it out, or give a "
+                "dipole this strength (in a scene file: leave the strength of the dipole out)",
+            )
 
     def replace(self, **changes: Any) -> Self:
-        """The same scene with some attributes changed, checked anew."""
+        """The same scene with some attributes changed, checked anew; with new scales, ``radius_to_thickness`` follows them."""
         known = [f.name for f in fields(self)]
         for name, value in changes.items():
             if name not in known:
                 raise InputError(name, value, unknown_name(name, name, known).allowed)
+        if changes.get("scales") is not None:
+            changes.setdefault("radius_to_thickness", None)
         return dataclasses.replace(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:
@@ -293,8 +313,11 @@ class Scene:
             "mesh": {**_describe("mesh", "shape", SHAPES, self.mesh), **{name: getattr(self, name) for name in SCENE_KEYS["mesh"]}},
             "run": _arguments(self.run) if self.run else {},
             "analysis": _arguments(self.analysis),
+            "scales": _arguments(self.scales) if self.scales else {},
         }
         tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
+        if self.scales:  # which hold it already
+            del tables["membrane"]["radius_to_thickness"]
         if self.run and self.run.control != "arc-length":
             del tables["run"]["max_steps"]
         plain: dict[str, Any] = _plain(tables)
@@ -316,13 +339,15 @@ class Scene:
         arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
         for table in SCENE_KEYS.keys() - {"mesh"}:
             _refuse_unknown(table, tables[table], SCENE_KEYS[table])
+        scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
         return cls(
             material=_build_one_of("material", "model", MATERIALS, tables["material"]),
-            sources=_build_sources(data.get("source", ())),
+            sources=_build_sources(data.get("source", ()), scales),
             mesh=_build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **tables["mesh"]}, beside=SCENE_KEYS["mesh"]),
             run=_build("run", Run, tables["run"]) if "run" in data else None,
             analysis=_build("analysis", Analysis, tables["analysis"]),
             title=data.get("title", ""),
+            scales=scales,
             **arguments,
         )
 
@@ -383,7 +408,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind"} | arguments(*SOURCES.values())
     keys["mesh"] |= {"shape"} | arguments(*SHAPES.values())
-    return keys | {"run": arguments(Run), "analysis": arguments(Analysis)}
+    return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
 
 
 def _refuse_unknown(path: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
@@ -407,7 +432,7 @@ def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...
     _refuse_unknown(path, table, (*beside, *names))
     for f in fields(cls):
         if f.name not in table and f.default is f.default_factory is dataclasses.MISSING:
-            raise InputError(f"{path}.{f.name}", None, "missing; it has no default")
+            raise InputError(f"{path}.{f.name}", None, "missing; " + _OTHERWISE.get((cls, f.name), "it has no default"))
     return cls(**{name: table[name] for name in names if name in table})
 
 
@@ -419,7 +444,7 @@ def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: 
     return _build(path, registry[table[selector]], table, (selector, *beside))
 
 
-def _build_sources(tables: Any) -> tuple[Source, ...]:
+def _build_sources(tables: Any, scales: Scales | None) -> tuple[Source, ...]:
     if isinstance(tables, Mapping):
         raise InputError("source", tables, "a list of tables is allowed: write [[source]], one for each source")
     tables = _sequence("source", tables, "a list of tables is allowed: [[source]], one for each source")
@@ -428,6 +453,8 @@ def _build_sources(tables: Any) -> tuple[Source, ...]:
         path = _source_path(k, len(tables))
         if not isinstance(table, Mapping):
             raise InputError(path, table, "a table is allowed: [[source]] with its keys below")
+        if table.get("kind") == "dipole" and scales is not None and scales.dipole_moment is not None:
+            table = {"strength": scales.strength, **table}  # only in place of one that is left out
         try:
             sources.append(_build_one_of(path, "kind", SOURCES, table))
         except InputError as error:  # a source does not know its place in the list
@@ -489,6 +516,19 @@ def _whole(key: str, value: Any, *, most: int | None = None) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1 or (most is not None and value > most):
         raise InputError(key, value, "a whole number >= 1 is allowed" if most is None else f"a whole number from 1 to {most} is allowed")
     return int(value)
+
+
+def _ratio(key: str, value: Any, scales: Scales | None) -> float:
+    """R0/T as given, or as it follows from the scales."""
+    if value is None:
+        return _RADIUS_TO_THICKNESS if scales is None else scales.radius_to_thickness
+    ratio = _number(key, value, "a finite number > 0 is allowed (R0 over the reference thickness)", above=0)
+    if scales is None:
+        return ratio
+    if not math.isclose(ratio, scales.radius_to_thickness, rel_tol=AGREEMENT):
+        follows = f"scales.radius / scales.thickness = {scales.radius_to_thickness:.12g}"
+        raise InputError(key, value, f"it contradicts {follows}; leave radius_to_thickness out, and it follows from the scales")
+    return scales.radius_to_thickness
 
 
 def _susceptibility(key: str, value: Any) -> float:

@@ -316,7 +316,7 @@ def test_refused(tables, key, advice):
         ({"run": {"control": "volume"}}, "run"),
         ({"analysis": ["pressure"]}, "analysis"),
         ({"degree": 0}, "mesh.degree"),
-        ({"radius_to_thickness": None}, "membrane.radius_to_thickness"),
+        ({"radius_to_thickness": "1000"}, "membrane.radius_to_thickness"),
         ({"title": None}, "title"),
     ],
 )

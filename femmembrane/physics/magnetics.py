@@ -57,9 +57,9 @@ class Dipole:
     orientation: int = 1
 
     def __post_init__(self) -> None:
-        if not (_is_number(self.strength) and self.strength >= 0):
+        if not (is_number(self.strength) and self.strength >= 0):
             raise InputError("source.strength", self.strength, "a finite number >= 0 is allowed")
-        if not _is_number(self.height):
+        if not is_number(self.height):
             raise InputError("source.height", self.height, "a finite number is allowed (in units of R0; negative is below)")
         if isinstance(self.orientation, bool) or self.orientation not in (1, -1):
             raise InputError("source.orientation", self.orientation, "1 or -1 is allowed")
@@ -98,7 +98,7 @@ def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rh
     return -susceptibility / 2 * (h_rho**2 + h_z**2)
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
     """Whether a value is a finite number, NumPy's included; truth values are none."""
     try:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(float(value))

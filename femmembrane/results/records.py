@@ -96,7 +96,8 @@ class Equilibrium:
         -------
         dict of ndarray
             r, rho, eta (over R0); stretch_1, stretch_2 (1 meridional, 2 circumferential); mechanical_stress_1, mechanical_stress_2,
-            total_stress_1, total_stress_2 (Cauchy, in units of mu).
+            total_stress_1, total_stress_2 (Cauchy, in units of mu); when the scene has scales, the stresses in Pa as well, under the
+            same names with ``_pa`` at the end.
 
         Raises
         ------
@@ -281,16 +282,32 @@ class Branch(Sequence[Equilibrium]):
         return iter(self.equilibria)
 
     def column(self, name: str) -> NDArray[Any]:
-        """One column of the table: step, an attribute of :class:`Equilibrium`, or lambda_/verdict_ with pressure, volume, n1, n2, ..."""
+        """One column of the table.
+
+        Parameters
+        ----------
+        name : str
+            step, an attribute of :class:`Equilibrium`, lambda_ or verdict_ with pressure, volume, n1, n2, ..., or, when the scene has
+            scales, pressure_pa.
+
+        Raises
+        ------
+        InputError
+            For an unknown name.
+        """
         if name == "step":
             return np.arange(len(self))
         kind, _, what = name.partition("_")
         if kind in ("lambda", "verdict") and (what in _SHOWN or re.fullmatch(r"n[1-9]\d*", what)):
             verdicts = [eq.verdict(what) if what in _SHOWN else eq.verdict(azimuthal=int(what[1:])) for eq in self]
             return np.array([v.smallest_eigenvalue if kind == "lambda" else v.word for v in verdicts])
+        scales = self.scene.scales
+        if name == "pressure_pa" and scales is not None:
+            return scales.to_si("pressure", self.column("pressure"))
         known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
         if name not in known:
-            raise unknown_name("column", name, ("step", *known, *(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN)))
+            others = [f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN] + (["pressure_pa"] if scales else [])
+            raise unknown_name("column", name, ("step", *known, *others))
         return np.array([getattr(eq, name) for eq in self])
 
     def __str__(self) -> str:
@@ -357,7 +374,7 @@ def _profile(eq: Equilibrium, s: Array) -> dict[str, Array]:
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
     total = total_stress(mechanical, eq.pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
-    return {
+    profile = {
         "r": R,
         "rho": rho,
         "eta": eta,
@@ -368,3 +385,7 @@ def _profile(eq: Equilibrium, s: Array) -> dict[str, Array]:
         "total_stress_1": total[0],
         "total_stress_2": total[1],
     }
+    if scene.scales is not None:
+        stresses = [name for name in profile if "stress" in name]
+        profile |= {f"{name}_pa": scene.scales.to_si("stress", profile[name]) for name in stresses}
+    return profile

@@ -32,11 +32,18 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 
+_STRESSES = {
+    "mechanical_stress_1": "meridional mechanical stress",
+    "mechanical_stress_2": "circumferential mechanical stress",
+    "total_stress_1": "meridional total stress",
+    "total_stress_2": "circumferential total stress",
+}
 #: long_name and units (1: non-dimensional) of every quantity that appears in a file
 MEANING: Mapping[str, tuple[str, str]] = {
     "step": ("number of the equilibrium along the branch", "1"),
     "volume": ("enclosed volume V/R0^3, signed", "1"),
     "pressure": ("pressure P = p R0/(mu T)", "1"),
+    "pressure_pa": ("pressure p", "Pa"),
     "center_height": ("height of the pole over R0", "1"),
     "elastic_energy": ("elastic energy over mu T R0^2", "1"),
     "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
@@ -50,10 +57,8 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "eta": ("deformed height over R0", "1"),
     "stretch_1": ("meridional stretch", "1"),
     "stretch_2": ("circumferential stretch", "1"),
-    "mechanical_stress_1": ("meridional mechanical stress over mu", "1"),
-    "mechanical_stress_2": ("circumferential mechanical stress over mu", "1"),
-    "total_stress_1": ("meridional total stress over mu", "1"),
-    "total_stress_2": ("circumferential total stress over mu", "1"),
+    **{name: (f"{stress} over mu", "1") for name, stress in _STRESSES.items()},
+    **{f"{name}_pa": (stress, "Pa") for name, stress in _STRESSES.items()},
     "kind": ("kind of the special point", "1"),
     "error": ("uncertainty of the special point's location", "1"),
     "azimuthal": ("number of waves around the axis of the instability that sets in", "1"),

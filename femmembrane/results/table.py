@@ -24,7 +24,7 @@ def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
     ``lambda_`` and ``verdict_`` exist for the controls in ``scene.analysis.stability``, ``lambda_n`` for the modes in
-    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources.
+    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources, ``pressure_pa`` when it has scales.
     """
     scene = branch.scene
     controls = [c for c in CONTROLS if c in scene.analysis.stability]
@@ -34,6 +34,7 @@ def columns(branch: Branch) -> list[str]:
         *(f"lambda_{c}" for c in controls),
         *(f"verdict_{c}" for c in controls),
         *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),
+        *(["pressure_pa"] if scene.scales else []),
         *("residual", "iterations", "seconds"),
     ]
 
@@ -48,6 +49,9 @@ def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str
     if kind == "lambda":
         verdict = equilibrium.verdict(azimuthal=int(name[1:])) if name[1:].isdigit() else equilibrium.verdict(name)
         return float(verdict.smallest_eigenvalue)
+    scales = equilibrium.scene.scales
+    if column == "pressure_pa" and scales is not None:
+        return scales.to_si("pressure", equilibrium.pressure)
     if column == "iterations":
         return int(equilibrium.iterations)
     return float(getattr(equilibrium, column))

@@ -74,6 +74,8 @@ class Parameter:
     def scene_at(self, value: float) -> Scene:
         """The scene with this value, checked like any other.
 
+        The moment in the scales is left out once no dipole has the strength that belongs to it.
+
         Raises
         ------
         InputError
@@ -90,7 +92,10 @@ class Parameter:
         index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
         sources: list[Any] = list(self.scene.sources)
         sources[index] = dataclasses.replace(sources[index], **{name: value})
-        return self.scene.replace(sources=tuple(sources))
+        scales = self.scene.scales
+        if scales is not None and not scales.fits(sources):
+            scales = dataclasses.replace(scales, dipole_moment=None)
+        return self.scene.replace(sources=tuple(sources), scales=scales)
 
     def vary(self, value: Any) -> Any:
         """The parts of the scene at a value that may be a symbol: nothing is checked, and nothing but formulas may use them."""

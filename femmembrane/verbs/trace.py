@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -208,8 +208,12 @@ class _Tracing:
         tracer.step = memory.step
         state = resume(potential, start[memory.regular - 1])
         point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1][:-1], float(memory.slopes[-1][-1]))
-        special = None if start.special_points is None else list(start.special_points)
-        return cls(scene, potential, point, tracer, list(start[: memory.regular]), special, on_step, max_steps, memory.regular)
+        # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
+        found = [replace(eq, scene=scene) for eq in start[: memory.regular]]
+        special = None
+        if start.special_points is not None:
+            special = [replace(p, equilibrium=replace(p.equilibrium, scene=scene)) for p in start.special_points]
+        return cls(scene, potential, point, tracer, found, special, on_step, max_steps, memory.regular)
 
     def follow(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str]:
         """Step until a target is met or the branch ends; the status, and a message unless a target was met."""

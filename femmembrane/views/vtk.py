@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: profile quantities that a file shows as point data, in this order
+#: profile quantities that a file shows as point data, in this order; those in Pa when the scene has scales
 FIELDS = (
     "stretch_1",
     "stretch_2",
@@ -40,6 +40,10 @@ FIELDS = (
     "mechanical_stress_2",
     "total_stress_1",
     "total_stress_2",
+    "mechanical_stress_1_pa",
+    "mechanical_stress_2_pa",
+    "total_stress_1_pa",
+    "total_stress_2_pa",
 )
 SECTORS = 48
 #: a source further from the membrane than this many times its size would leave the membrane a speck in the picture
@@ -173,7 +177,7 @@ def render(
     path : path
         PNG file to write.
     quantity : str
-        What the colour shows: one of :data:`FIELDS`.
+        What the colour shows: one of :data:`FIELDS` (those in Pa only when the scene has scales).
     size : tuple of int
         Width and height of the picture in pixels.
 
@@ -255,8 +259,9 @@ def _draw_membrane(plotter: pyvista.Plotter, profile: Mapping[str, Array], quant
     faces = np.concatenate([np.insert(c, 0, c.shape[1], axis=1).ravel() for c in (revolution.triangles, revolution.quads)])
     surface = pyvista.PolyData(points, faces=faces)
     surface.point_data[quantity] = revolution.scalars(profile[quantity])
+    meaning, unit = MEANING[quantity]
     bar = {
-        "title": MEANING[quantity][0].replace(" ", "\n") + "\n",
+        "title": (meaning if unit == "1" else f"{meaning} in {unit}").replace(" ", "\n") + "\n",
         "vertical": True,
         "n_labels": 5,
         "fmt": "%.3g",

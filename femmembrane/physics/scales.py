@@ -1,0 +1,205 @@
+"""Physical scales of a membrane: between the non-dimensional quantities of a scene and SI units.
+
+=====================  ====================  =========
+quantity               unit                  SI
+=====================  ====================  =========
+``length``             R0                    m
+``volume``             R0^3                  m^3
+``pressure``           mu T/R0               Pa
+``stress``             mu                    Pa
+``energy``             mu T R0^2             J
+``dipole_strength``    see below             A m^2
+=====================  ====================  =========
+
+A dipole strength corresponds to a physical moment m through M = mu0 D^2/(R0^6 mu) with D = m/(4 pi) (paper eq. 33), that is
+M = (m/m_0)^2 with m_0 = 4 pi R0^3 sqrt(mu/mu0).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, unknown_name
+from .magnetics import Dipole, is_number
+
+#: SI unit of every quantity
+UNITS: Mapping[str, str] = {
+    "length": "m",
+    "volume": "m^3",
+    "pressure": "Pa",
+    "stress": "Pa",
+    "energy": "J",
+    "dipole_strength": "A m^2",
+}
+#: relative difference up to which two numbers that say the same thing agree
+AGREEMENT = 1e-9
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The physical size, thickness and stiffness of a membrane.
+
+    Parameters
+    ----------
+    radius : float
+        R0 in m.
+    thickness : float
+        Reference thickness T in m.
+    shear_modulus : float
+        Ground-state shear modulus mu in Pa.
+    dipole_moment : float, optional
+        Magnetic moment m > 0 of a dipole in A m^2; its sense is the orientation of the dipole.
+
+    Raises
+    ------
+    InputError
+        For a value that is not a finite number > 0, and when a unit that follows from them is beyond the range of a float.
+    """
+
+    radius: float
+    thickness: float
+    shear_modulus: float
+    dipole_moment: float | None = None
+
+    def __post_init__(self) -> None:
+        unit = {"radius": "m", "thickness": "m", "shear_modulus": "Pa", "dipole_moment": "A m^2"}
+        for name in (f.name for f in fields(self)):
+            value = getattr(self, name)
+            if name == "dipole_moment" and value is None:
+                continue
+            if not (is_number(value) and float(value) > 0):
+                raise InputError(f"scales.{name}", value, f"a finite number > 0 is allowed (in {unit[name]})")
+            object.__setattr__(self, name, float(value))
+        for quantity in UNITS.keys() - {"dipole_strength"}:
+            self._unit(quantity)
+        self._in_range("radius over thickness", self.radius_to_thickness)
+        if self.dipole_moment is not None:
+            with np.errstate(over="ignore"):  # refused in the next line
+                self._in_range("the strength of dipole_moment", self.strength)
+
+    @property
+    def radius_to_thickness(self) -> float:
+        """R0/T."""
+        return self.radius / self.thickness
+
+    @property
+    def strength(self) -> float:
+        """Strength M of a dipole with the moment ``dipole_moment``.
+
+        Raises
+        ------
+        InputError
+            When no moment is given.
+        """
+        if self.dipole_moment is None:
+            raise InputError("scales.dipole_moment", None, "missing; give the moment of the dipole in A m^2, and its strength follows")
+        return self.from_si("dipole_strength", self.dipole_moment)
+
+    @staticmethod
+    def units(quantity: str) -> str:
+        """The SI unit of a quantity.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity.
+        """
+        _check_quantity(quantity)
+        return UNITS[quantity]
+
+    @overload
+    def to_si(self, quantity: str, value: float) -> float: ...
+
+    @overload
+    def to_si(self, quantity: str, value: NDArray[Any] | Sequence[Any]) -> Array: ...
+
+    def to_si(self, quantity: str, value: Any) -> float | Array:
+        """A non-dimensional value in SI units; of a dipole strength: the moment.
+
+        Parameters
+        ----------
+        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength"}
+        value : float or array_like
+            In the units of the package; volumes and energies with the 2 pi.
+
+        Returns
+        -------
+        float or ndarray
+            In ``units(quantity)``, of the shape of ``value``.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity, a value that is no number, or a negative dipole strength.
+        """
+        given = _values(quantity, value)
+        return _plain((np.sqrt(given) if quantity == "dipole_strength" else given) * self._unit(quantity))
+
+    @overload
+    def from_si(self, quantity: str, value: float) -> float: ...
+
+    @overload
+    def from_si(self, quantity: str, value: NDArray[Any] | Sequence[Any]) -> Array: ...
+
+    def from_si(self, quantity: str, value: Any) -> float | Array:
+        """The non-dimensional value of one in SI units: the inverse of :meth:`to_si`.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity, a value that is no number, or a negative moment (a dipole's orientation holds its sense).
+        """
+        ratio = _values(quantity, value) / self._unit(quantity)
+        return _plain(ratio * ratio if quantity == "dipole_strength" else ratio)
+
+    def fits(self, sources: Iterable[Any]) -> bool:
+        """Whether ``dipole_moment``, if given, is that of one of the sources, to 1e-9 of its strength."""
+        if self.dipole_moment is None:
+            return True
+        strengths = [source.strength for source in sources if isinstance(source, Dipole)]
+        return any(math.isclose(strength, self.strength, rel_tol=AGREEMENT) for strength in strengths)
+
+    def _unit(self, quantity: str) -> float:
+        R, T, mu = self.radius, self.thickness, self.shear_modulus
+        if quantity == "dipole_strength":
+            from scipy.constants import mu_0  # here, so that reading a scene without a moment need not wait for it
+
+            unit = 4 * math.pi * R * R * R * math.sqrt(mu / mu_0)
+        else:
+            unit = {"length": R, "volume": R * R * R, "pressure": mu * T / R, "stress": mu, "energy": mu * T * R * R}[quantity]
+        return self._in_range(f"the unit of {quantity}", unit)
+
+    def _in_range(self, what: str, number: float) -> float:
+        if not 0 < number < math.inf:
+            raise InputError("scales", self, f"{what} would be {number:g}; radius and thickness in m and shear_modulus in Pa are allowed")
+        return number
+
+
+def _check_quantity(quantity: Any) -> None:
+    if not isinstance(quantity, str) or quantity not in UNITS:
+        raise unknown_name("quantity", quantity, UNITS)
+
+
+def _values(quantity: str, value: Any) -> Array:
+    _check_quantity(quantity)
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        raise InputError("value", value, "a number or an array of numbers is allowed") from None
+    if array.dtype.kind not in "iuf":
+        raise InputError("value", value, "a number or an array of numbers is allowed")
+    if quantity == "dipole_strength" and not (array >= 0).all():
+        raise InputError("value", value, "a strength or moment >= 0 is allowed; the sense of a moment is the orientation of its dipole")
+    return array.astype(np.float64)
+
+
+def _plain(values: Any) -> float | Array:
+    return values if np.ndim(values) else float(values)

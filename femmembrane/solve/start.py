@@ -16,6 +16,7 @@ from .controls import CenterHeightControl, PressureControl, VolumeControl
 from .newton import correct
 from .state import Path, State
 from .stepping import march
+from .wellposed import ill_posed
 
 #: below this volume a membrane with sources is reached from here: turning sources on at the flat state starts from a singular Hessian
 START_VOLUME = 0.5
@@ -88,6 +89,9 @@ def _inflated(potential: Potential, volume: float) -> State:
     result = correct(potential, VolumeControl(volume), spherical_dome(potential, volume), 0.0, magnetic=0.0, damped=True, max_iterations=40)
     if result.status is Status.CONVERGED:
         return State.of(result)
+    bad = ill_posed(potential, result.evaluation)
+    if bad is not None and bad.slack:
+        raise SolveError(f"no tension holds a dome of volume {volume:.6g}: {bad}", status=Status.SLACK)
     if abs(volume) <= SAFE_VOLUME:
         raise SolveError(f"no dome of volume {volume:.6g} could be inflated; {result.status.advice}", status=result.status)
     first = np.copysign(SAFE_VOLUME, volume)

@@ -60,7 +60,7 @@ def natural_strains(e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
     Written with products of truth values, not with minima and maxima, so that a NaN stays one: a state outside the domain of the
     energy may not pass for a slack one.
     """
-    least1, least2 = -(e2 > 0) * e2 / 2, -(e1 > 0) * e1 / 2
+    least1, least2 = -e2 * (e2 > 0) / 2, -e1 * (e1 > 0) / 2
     taut1, taut2 = e1 >= least1, e2 >= least2
     return taut1 * e1 + (1 - taut1) * least1, taut2 * e2 + (1 - taut2) * least2, taut1, taut2
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from ..stability.zones import KINDS
 from .store import replace_file
 
 if TYPE_CHECKING:
@@ -18,13 +19,15 @@ if TYPE_CHECKING:
 #: the order in which verdicts of the two controls are listed
 CONTROLS = ("pressure", "volume")
 SPECIAL_POINT_COLUMNS = ("kind", "volume", "pressure", "center_height", "error")
+ZONE_COLUMNS = ("step", "kind", "r_start", "r_end", "rho_start", "rho_end", "area_fraction", "deformed_area_fraction")
 
 
 def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
     ``lambda_`` and ``verdict_`` exist for the controls in ``scene.analysis.stability``, ``lambda_n`` for the modes in
-    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources.
+    ``scene.analysis.azimuthal_modes``, ``fraction_`` of the area for each kind of zone if it asks for ``wrinkling``, ``magnetic_energy``
+    when the scene has sources.
     """
     scene = branch.scene
     controls = [c for c in CONTROLS if c in scene.analysis.stability]
@@ -34,6 +37,7 @@ def columns(branch: Branch) -> list[str]:
         *(f"lambda_{c}" for c in controls),
         *(f"verdict_{c}" for c in controls),
         *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),
+        *((f"fraction_{kind}" for kind in KINDS) if scene.analysis.wrinkling else ()),
         *("residual", "iterations", "seconds"),
     ]
 
@@ -48,6 +52,8 @@ def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str
     if kind == "lambda":
         verdict = equilibrium.verdict(azimuthal=int(name[1:])) if name[1:].isdigit() else equilibrium.verdict(name)
         return float(verdict.smallest_eigenvalue)
+    if kind == "fraction":
+        return equilibrium.zones().fraction(name)
     if column == "iterations":
         return int(equilibrium.iterations)
     return float(getattr(equilibrium, column))
@@ -79,6 +85,18 @@ def special_point_columns(branch: Branch) -> list[str]:
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the special points; no rows means that the branch was searched and has none."""
     _write(path, special_point_columns(branch), special_point_rows(branch))
+
+
+def zone_rows(branch: Branch) -> Iterator[list[Any]]:
+    """One row for each zone of each equilibrium, from the pole to the rim, in the order of :data:`ZONE_COLUMNS`."""
+    for step, equilibrium in enumerate(branch):
+        for zone in equilibrium.zones():
+            yield [step, zone.kind, *zone.r, *zone.rho, zone.area_fraction, zone.deformed_area_fraction]
+
+
+def write_zones_csv(branch: Branch, path: str | PathLike[str]) -> None:
+    """Write the zones by the criterion of the scene."""
+    _write(path, list(ZONE_COLUMNS), zone_rows(branch))
 
 
 def to_dataframe(branch: Branch) -> pandas.DataFrame:

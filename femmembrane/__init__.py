@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from .stability.jacobi import jacobi_test as jacobi_test
     from .stability.jacobi import legendre_test as legendre_test
     from .stability.verdict import Verdict as Verdict
+    from .stability.zones import Zone as Zone
+    from .stability.zones import Zones as Zones
     from .verbs import Equilibria as Equilibria
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
@@ -63,6 +65,7 @@ _ROOMS = {
     "stability.frequencies": ("Vibration",),
     "stability.jacobi": ("jacobi_test", "legendre_test"),
     "stability.verdict": ("Verdict",),
+    "stability.zones": ("Zone", "Zones"),
     "verbs.folds": ("Cusp", "FoldCurve"),
     "verbs": ("Equilibria", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace", "trace_iter"),
     "views.modes": ("render_mode", "write_mode_vtk"),

@@ -45,6 +45,7 @@ CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
 VERDICTS = ("pressure", "volume")
+WRINKLING = ("total", "mechanical")
 QUANTITIES = ("volume", "pressure", "center_height")
 SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "membrane": ("susceptibility", "radius_to_thickness"),
@@ -178,6 +179,8 @@ class Analysis:
         Controls under which the verdict on axisymmetric perturbations is given.
     azimuthal_modes : sequence of int
         Circumferential wave numbers n >= 1 for which the verdict is given.
+    wrinkling : {"total", "mechanical"}, optional
+        The principal stresses whose signs divide the membrane into taut and wrinkled zones; left out: no zones are looked for.
 
     Raises
     ------
@@ -187,6 +190,7 @@ class Analysis:
 
     stability: tuple[str, ...] = ()
     azimuthal_modes: tuple[int, ...] = ()
+    wrinkling: str | None = None
 
     def __post_init__(self) -> None:
         stability = _sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure" and "volume"')
@@ -196,6 +200,8 @@ class Analysis:
         modes = tuple(_whole(f"analysis.azimuthal_modes[{k}]", n) for k, n in enumerate(modes))
         _unique("analysis.stability", stability)
         _unique("analysis.azimuthal_modes", modes)
+        if self.wrinkling is not None:
+            _choice("analysis.wrinkling", self.wrinkling, WRINKLING)
         _convert(self, stability=stability, azimuthal_modes=modes)
 
 
@@ -249,7 +255,7 @@ class Scene:
         _require("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
         _require("mesh", self.mesh, ("breakpoints", "position", "tangent", "supports"), "a mesh is allowed, such as disc(elements=64)")
         _require("run", self.run, () if self.run is None else ("loads",), "a Run is allowed")
-        _require("analysis", self.analysis, ("stability", "azimuthal_modes"), "an Analysis is allowed")
+        _require("analysis", self.analysis, ("stability", "azimuthal_modes", "wrinkling"), "an Analysis is allowed")
         sources = _sequence("source", self.sources, "a list of sources is allowed, such as [Dipole(strength=..., height=...)]")
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _require("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)

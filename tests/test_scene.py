@@ -134,6 +134,7 @@ analyses = st.builds(
     Analysis,
     stability=st.lists(st.sampled_from(["pressure", "volume"]), unique=True),
     azimuthal_modes=st.lists(st.integers(1, 20), unique=True, max_size=3),
+    wrinkling=st.sampled_from([None, "total", "mechanical"]),
 )
 orientations = st.sampled_from([1, -1])
 dipoles = st.builds(Dipole, strength=positive | st.integers(0, 600), height=heights, orientation=orientations)
@@ -198,7 +199,8 @@ REFUSED = [
     (plain(mesh={"susceptibility": 4}), "mesh.susceptibility", "belongs in [membrane]"),
     (plain(membrane={"suceptibility": 4}), "membrane.suceptibility", "did you mean 'susceptibility'"),
     (plain(run={**VOLUME, "stepps": 4}), "run.stepps", "did you mean 'steps'"),
-    (plain(analysis={"wrinkling": "total"}), "analysis.wrinkling", "unknown"),
+    (plain(analysis={"wrinkle": "total"}), "analysis.wrinkle", "did you mean 'wrinkling'"),
+    (plain(analysis={"wrinkling": "totl"}), "analysis.wrinkling", "did you mean 'total'"),
     (plain(mesh=4), "mesh", "a table"),
     ({"material": "ogden"}, "material", "a table"),
     # material

@@ -201,3 +201,17 @@ def test_nearly_flat_cold_starts_take_a_handful_of_iterations(damped):
         result = correct(potential, VolumeControl(volume), spherical_dome(potential, volume), 0.0, magnetic=0.0, damped=damped)
         assert result.status is fm.Status.CONVERGED
         assert result.iterations <= 6
+
+
+@pytest.mark.parametrize("height", [-0.1, -0.4])
+def test_a_low_pole_above_a_strong_dipole_is_reached_from_the_inflated_side(height):
+    """M = 400, h = -3.25: turned on over the deflated membrane, the dipole would tear it down before its full strength."""
+    eq = fm.equilibrium(disc_scene(OGDEN, (400.0, -3.25), elements=24), center_height=height)
+    assert eq.status is fm.Status.CONVERGED
+    assert eq.center_height == pytest.approx(height, abs=1e-12)
+    assert eq.volume > 0
+
+
+def test_where_neither_side_leads_the_first_reason_is_given():
+    with pytest.raises(fm.SolveError, match=r"at V = -0\.5"):
+        fm.equilibrium(disc_scene(OGDEN, (600.0, -1.2), elements=16), center_height=-0.3)

@@ -17,7 +17,7 @@ from femmembrane.results.records import Branch, Equilibrium, Jump, SpecialPoint
 from femmembrane.scene import Analysis, Scene
 from femmembrane.stability.verdict import Verdict
 from femmembrane.verbs import inflate
-from femmembrane.views import plots, vtk
+from femmembrane.views import plots, vtk, zones
 
 pyvista = pytest.importorskip("pyvista")
 
@@ -325,8 +325,101 @@ def test_profiles(branch: Branch, tmp_path: Path) -> None:
     assert axes.get_ylim()[1] > 5
 
 
+# --- wrinkling: bands along curves and filled regions
+
+
+def wrinkled(branch: Branch, criterion: str | None = "total") -> Branch:
+    """The branch beside a dipole that compresses the flattest membrane around its pole; stresses need no balance."""
+    scene = branch.scene.replace(sources=[Dipole(strength=150, height=4.5)], analysis=Analysis(("volume",), wrinkling=criterion))
+    equilibria = tuple(judged(dataclasses.replace(e, scene=scene, _zones={}), True, True) for e in branch)
+    return dataclasses.replace(branch, scene=scene, equilibria=equilibria)
+
+
+def bands(axes: object) -> dict[str, list[object]]:
+    """Lines drawn as bands, by the first word of their labels; unnamed ones under that of the band before."""
+    found: dict[str, list[object]] = {}
+    word = ""
+    for line in axes.lines:  # type: ignore[attr-defined]
+        if line.get_path_effects():
+            word = word if line.get_label().startswith("_") else line.get_label().split()[0]
+            found.setdefault(word, []).append(line)
+    return found
+
+
+def test_meridian_shows_its_zones(branch: Branch) -> None:
+    """Bands end exactly at the located borders, on both halves; they differ without colour, and are drawn when asked for."""
+    equilibrium = wrinkled(branch)[0]
+    assert equilibrium.zones().kinds == ("double", "radial", "taut")
+    _, axes = plots.new_figure((6, 4))
+    plots.draw_profile(axes, equilibrium, plots.PLAIN)
+    found = bands(axes)
+    double, radial, _ = equilibrium.zones()
+    (line,) = found["double"]
+    assert (line.get_xdata()[0], line.get_xdata()[-1]) == pytest.approx((-double.rho[1], double.rho[1]), abs=1e-14)
+    ends = sorted(abs(x) for line in found["radial"] for x in (line.get_xdata()[0], line.get_xdata()[-1]))
+    assert ends == pytest.approx(sorted(2 * radial.rho), abs=1e-14)
+    assert "double wrinkles (total s11, s22 < 0)" in plots.legend_entries(axes)[1]
+    _, axes = plots.new_figure((6, 4))
+    plots.draw_profile(axes, equilibrium, plots.PLAIN, zones=False)
+    assert bands(axes) == {}
+    plots.draw_profile(axes, wrinkled(branch, None)[0], plots.PLAIN, zones=True)
+    assert bands(axes).keys() == {"double", "radial"}
+
+
+def test_patterns_differ_without_colour() -> None:
+    looks = [(p.core, p.ink, str(p.dashes), p.hatch) for p in zones.PATTERNS.values()]
+    assert len(set(looks)) == len({p.hatch for p in zones.PATTERNS.values()}) == 4
+    for pattern in zones.PATTERNS.values():
+        assert 0 <= float(pattern.ink) <= float(pattern.fill) <= 1  # shades of grey
+
+
+def test_branch_shows_where_it_is_wrinkled(branch: Branch) -> None:
+    """A band up to half-way to the first equilibrium that is taut everywhere, wider than that of azimuthal instability."""
+    shown = wrinkled(branch)
+    assert [zones.shown_kinds(e.zones()) for e in shown] == [("double",), (), (), ()]
+    (axes,) = plots.plot_pressure_volume(shown).axes
+    ((line,),) = bands(axes).values()
+    assert line.get_xdata().tolist() == [shown[0].volume, (shown[0].volume + shown[1].volume) / 2]
+    assert line.get_linewidth() > 8
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["stable under volume control", "double wrinkles (total s11, s22 < 0)"]
+    assert bands(plots.plot_pressure_volume(wrinkled(branch, None)).axes[0]) == {}
+
+
+def test_zones_picture(branch: Branch, tmp_path: Path) -> None:
+    from matplotlib.image import imread
+
+    shown = wrinkled(branch)
+    figure = plots.plot_zones(shown, tmp_path / "zones.png")
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("volume V/R₀³", "reference radius r/R₀")
+    assert axes.get_xlim() == pytest.approx((shown[0].volume, shown[-1].volume))
+    assert axes.get_ylim() == pytest.approx((0, 1))
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["taut", "radial wrinkles (total s22 < 0)", "double wrinkles (total s11, s22 < 0)"]
+    corners = {tuple(point) for line in axes.lines for point in line.get_xydata().tolist()}
+    assert {(e.volume, border) for e in shown for border in e.zones().borders} <= corners
+    image = imread(tmp_path / "zones.png")[..., :3]
+    assert image.std() > 0.05
+    assert np.abs(np.ptp(image, axis=2)).max() < 0.01  # grey throughout
+
+
+def test_zones_against_steps(branch: Branch) -> None:
+    """A branch that turns back in volume is shown by its steps; one that goes down is shown from small volumes to large."""
+    shown = wrinkled(branch)
+    back = dataclasses.replace(shown, equilibria=(*shown.equilibria, shown[1]))
+    (axes,) = plots.plot_zones(back).axes
+    assert axes.get_xlabel() == "step"
+    assert axes.get_xlim() == pytest.approx((0, 4))
+    (axes,) = plots.plot_zones(dataclasses.replace(shown, equilibria=shown.equilibria[::-1])).axes
+    (same,) = plots.plot_zones(shown).axes
+    assert [line.get_xydata().tolist() for line in axes.lines] == [line.get_xydata().tolist() for line in same.lines]
+    (axes,) = plots.plot_zones(shown[:1]).axes
+    assert axes.get_xlim() == pytest.approx((-0.5, 0.5))
+
+
 def test_plots_refuse(branch: Branch) -> None:
-    for plot in (plots.plot_pressure_volume, plots.plot_profiles):
+    for plot in (plots.plot_pressure_volume, plots.plot_profiles, plots.plot_zones):
         with pytest.raises(InputError, match="one or more equilibria"):
             plot(branch[:0])
     with pytest.raises(InputError, match="count"):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .store import package_version, replace_file, save
-from .table import write_csv, write_special_points_csv
+from .table import write_csv, write_special_points_csv, write_zones_csv
 
 if TYPE_CHECKING:
     from .records import Branch
@@ -24,10 +24,10 @@ NOTED_VERSIONS = ("femmembrane", "numpy", "scipy", "scikit-fem", "casadi")
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:
     """Write everything that is known of a branch to a folder.
 
-    ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), ``run.json``, ``branch.nc``, ``pressure-volume.png``
-    and, last, ``membrane.pvd`` with one VTU file an equilibrium in ``membrane/``. Every file is written whole or not at all. A branch
-    without equilibria leaves ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write
-    are removed, so that the folder speaks of one run only.
+    ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), ``zones.csv`` and ``zones.png`` (when the scene asks for
+    wrinkling), ``run.json``, ``branch.nc``, ``pressure-volume.png`` and, last, ``membrane.pvd`` with one VTU file an equilibrium in
+    ``membrane/``. Every file is written whole or not at all. A branch without equilibria leaves ``run.json`` and tables without rows. Files
+    of an earlier run in the same folder that this run does not write are removed, so that the folder speaks of one run only.
 
     Parameters
     ----------
@@ -53,25 +53,34 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     write_csv(branch, files["branch.csv"])
     if "special_points.csv" in files:
         write_special_points_csv(branch, files["special_points.csv"])
+    if "zones.csv" in files:
+        write_zones_csv(branch, files["zones.csv"])
     _write_json(_facts(branch, command), files["run.json"])
-    from ..views.plots import plot_pressure_volume
+    from ..views.plots import plot_pressure_volume, plot_zones
     from ..views.vtk import remove_surfaces, write_vtk
 
     if len(branch):
         save(branch, files["branch.nc"])
         plot_pressure_volume(branch, files["pressure-volume.png"])
+        if "zones.png" in files:
+            plot_zones(branch, files["zones.png"])
         write_vtk(branch, files["membrane.pvd"])
     else:
         remove_surfaces(folder / "membrane.pvd")
     return list(files.values())
 
 
-_ALL = ("branch.csv", "special_points.csv", "run.json", "branch.nc", "pressure-volume.png", "membrane.pvd")
+_ALL = (
+    *("branch.csv", "special_points.csv", "zones.csv", "run.json"),
+    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
+)
 
 
 def _names(branch: Branch) -> list[str]:
     """The files that this branch gets, in the order of writing."""
-    absent = set() if len(branch) else {"branch.nc", "pressure-volume.png", "membrane.pvd"}
+    absent = set() if len(branch) else {"branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"}
+    if not branch.scene.analysis.wrinkling:
+        absent |= {"zones.csv", "zones.png"}
     if branch.special_points is None:
         absent.add("special_points.csv")
     return [name for name in _ALL if name not in absent]

@@ -12,9 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..physics.kinematics import meridional_strain
-from ..physics.magnetics import magnetic_field
-from ..physics.stress import total_stress
 from ..threads import one_thread
 
 if TYPE_CHECKING:
@@ -23,6 +20,7 @@ if TYPE_CHECKING:
     from ..solve.controls import Gas
     from ..stability.frequencies import Vibration
     from ..stability.verdict import Verdict
+    from ..stability.zones import Zones
 
 Array = NDArray[np.float64]
 
@@ -71,6 +69,7 @@ class Equilibrium:
     seconds: float = field(default=0.0, repr=False)
     gas: Gas | None = field(default=None, repr=False)
     _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
+    _zones: dict[str, Zones] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
@@ -104,9 +103,11 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
+        from ..stability.profile import profile_at
+
         space = self.potential.space
         s = space.node_parameters() if r is None else _radii(r, space.mesh.breakpoints())
-        return _profile(self, s)
+        return profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
@@ -169,6 +170,28 @@ class Equilibrium:
         from ..stability.frequencies import natural_frequencies
 
         return natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
+
+    def zones(self, criterion: str | None = None) -> Zones:
+        """Taut and wrinkled zones by the signs of the principal stresses, from the pole to the rim; computed once and remembered.
+
+        Zones thinner than about a tenth of an element may be missed.
+
+        Parameters
+        ----------
+        criterion : {"total", "mechanical"}, optional
+            The stresses that decide; default what the scene asks for in ``analysis.wrinkling``, or "total".
+
+        Raises
+        ------
+        InputError
+            For an unknown criterion.
+        """
+        from ..stability import zones
+
+        criterion = (self.scene.analysis.wrinkling or "total") if criterion is None else criterion
+        if not isinstance(criterion, str) or criterion not in self._zones:
+            self._zones[criterion] = zones.find_zones(self.scene, self.state, self.pressure, criterion)
+        return self._zones[criterion]
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,36 +310,43 @@ class Branch(Sequence[Equilibrium]):
         Parameters
         ----------
         name : str
-            step, an attribute of :class:`Equilibrium`, lambda_ or verdict_ with pressure, volume, n1, n2, ..., or, when the scene has
-            scales, pressure_pa.
+            step, an attribute of :class:`Equilibrium`, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind of
+            zones, or, when the scene has scales, pressure_pa.
 
         Raises
         ------
         InputError
             For an unknown name.
         """
+        from ..stability.zones import KINDS
+
         if name == "step":
             return np.arange(len(self))
         kind, _, what = name.partition("_")
         if kind in ("lambda", "verdict") and (what in _SHOWN or re.fullmatch(r"n[1-9]\d*", what)):
             verdicts = [eq.verdict(what) if what in _SHOWN else eq.verdict(azimuthal=int(what[1:])) for eq in self]
             return np.array([v.smallest_eigenvalue if kind == "lambda" else v.word for v in verdicts])
+        if kind == "fraction" and what in KINDS:
+            return np.array([eq.zones().fraction(what) for eq in self], dtype=np.float64)
         scales = self.scene.scales
         if name == "pressure_pa" and scales is not None:
             return scales.to_si("pressure", self.column("pressure"))
         known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
         if name not in known:
-            others = [f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN] + (["pressure_pa"] if scales else [])
-            raise unknown_name("column", name, ("step", *known, *others))
+            more = [*(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN), *(f"fraction_{k}" for k in KINDS)]
+            raise unknown_name("column", name, ("step", *known, *more, *(["pressure_pa"] if scales else [])))
         return np.array([getattr(eq, name) for eq in self])
 
     def __str__(self) -> str:
         classes = self.scene.analysis.stability or _SHOWN
+        zones = self.scene.analysis.wrinkling is not None
         head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {'under ' + c:<14}" for c in classes)
+        head += "  zones" if zones else ""
         lines = [self.scene.title, head] if self.scene.title else [head]
         for k, eq in enumerate(self):
             numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
-            lines.append(numbers + "".join(f"  {eq.verdict(c).word:<14}" for c in classes))
+            words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
+            lines.append(numbers + words + (f"  {eq.zones().summary}" if zones else ""))
         if self.message:
             lines.append(self.message)
         return "\n".join(line.rstrip() for line in lines)
@@ -357,35 +387,3 @@ def _radii(r: ArrayLike, ends: Array) -> Array:
     if not ((s >= ends[0]) & (s <= ends[-1])).all():
         raise InputError("r", r, f"reference radii in [{ends[0]:g}, {ends[-1]:g}] are allowed")
     return s
-
-
-def _profile(eq: Equilibrium, s: Array) -> dict[str, Array]:
-    scene, space = eq.scene, eq.potential.space
-    u, _, w, _ = space.evaluate(eq.state, s)
-    u_s, w_s = space.recovered_slopes(eq.state, s)
-    (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
-    pole = R == 0  # there u/R is the limit u_s/R_s
-    e1 = meridional_strain(R_s, Z_s, u_s, w_s)
-    e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
-    rho, eta = R + u, Z + w
-    mechanical = eq.potential.material.stress(e1, e2)
-    sources = scene.sources
-    h = magnetic_field(sources, rho, eta) if sources else (0.0, 0.0)
-    slope = np.hypot(R_s + u_s, Z_s + w_s)
-    tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
-    total = total_stress(mechanical, eq.pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
-    profile = {
-        "r": R,
-        "rho": rho,
-        "eta": eta,
-        "stretch_1": np.exp(e1),
-        "stretch_2": np.exp(e2),
-        "mechanical_stress_1": mechanical[0],
-        "mechanical_stress_2": mechanical[1],
-        "total_stress_1": total[0],
-        "total_stress_2": total[1],
-    }
-    if scene.scales is not None:
-        stresses = [name for name in profile if "stress" in name]
-        profile |= {f"{name}_pa": scene.scales.to_si("stress", profile[name]) for name in stresses}
-    return profile

@@ -1,8 +1,8 @@
 """Branches on disk: NetCDF files that hold a computation whole, and the one way in which the package writes files.
 
 A file is one data set with the dimensions ``step`` (equilibria), ``node`` (points along the meridian), ``coefficient`` (the state) and,
-when the branch was searched for them, ``special_point``. The state is kept to the last bit, so that a loaded equilibrium is the one that
-was saved; everything else in the file can be read without this package.
+when the branch was searched for them, ``special_point`` and ``zone``. The state is kept to the last bit, so that a loaded equilibrium is
+the one that was saved; everything else in the file can be read without this package.
 """
 
 from __future__ import annotations
@@ -67,6 +67,18 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "trace_slope": ("their derivatives with respect to arc length", "1"),
     "jump_index": ("number of the equilibrium that a snap of the membrane landed on", "1"),
     "jump_limit": ("whether the fold before the snap was located", "1"),
+    "fraction_taut": ("part of the reference area that is taut", "1"),
+    "fraction_radial": ("part of the reference area with radial wrinkles (only s22 < 0)", "1"),
+    "fraction_circumferential": ("part of the reference area with circumferential wrinkles (only s11 < 0)", "1"),
+    "fraction_double": ("part of the reference area with wrinkles both ways (s11 < 0 and s22 < 0)", "1"),
+    "zone_step": ("number of the equilibrium that the zone belongs to", "1"),
+    "zone_kind": ("kind of the zone", "1"),
+    "zone_r_start": ("reference radius over R0 at which the zone starts", "1"),
+    "zone_r_end": ("reference radius over R0 at which the zone ends", "1"),
+    "zone_rho_start": ("deformed radius over R0 at which the zone starts", "1"),
+    "zone_rho_end": ("deformed radius over R0 at which the zone ends", "1"),
+    "zone_area_fraction": ("part of the reference area in the zone", "1"),
+    "zone_deformed_area_fraction": ("part of the deformed area in the zone", "1"),
 }
 
 Array = NDArray[np.float64]
@@ -117,6 +129,8 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
     variables = {**_table_variables(branch), **_equilibrium_variables(list(branch), width, "step"), **_profile_variables(branch)}
     for tag, control, azimuthal in _asked(branch.scene):
         variables |= _verdict_variables(tag, [e.verdict(control, azimuthal=azimuthal) for e in branch])
+    if branch.scene.analysis.wrinkling:
+        variables |= _zone_variables(branch)
     if branch.special_points is not None:
         variables |= _special_variables(branch.special_points, width, _SPECIAL)
     if branch.jumps:
@@ -238,6 +252,15 @@ def _shape(verdict: Verdict) -> dict[str, Array]:
     if mode is None or verdict.coefficients is None:
         return {}
     return {**{key: values for key, values in mode.items() if key != "r"}, "coefficients": verdict.coefficients}
+
+
+def _zone_variables(branch: Branch) -> dict[str, _Variable]:
+    """The zones one after the other, for readers of the file: a loaded branch finds them again from its states."""
+    from .table import ZONE_COLUMNS, zone_rows
+
+    table = list(zone_rows(branch))
+    columns = zip(*table, strict=True) if table else ([] for _ in ZONE_COLUMNS)
+    return {f"zone_{name}": (("zone",), _array(name, column)) for name, column in zip(ZONE_COLUMNS, columns, strict=True)}
 
 
 def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, _Variable]:

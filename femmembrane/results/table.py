@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from ..stability.zones import KINDS
 from .store import replace_file
 
 if TYPE_CHECKING:
@@ -18,13 +19,15 @@ if TYPE_CHECKING:
 #: the order in which verdicts of the two controls are listed
 CONTROLS = ("pressure", "volume")
 SPECIAL_POINT_COLUMNS = ("kind", "volume", "pressure", "center_height", "error")
+ZONE_COLUMNS = ("step", "kind", "r_start", "r_end", "rho_start", "rho_end", "area_fraction", "deformed_area_fraction")
 
 
 def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
     ``lambda_`` and ``verdict_`` exist for the controls in ``scene.analysis.stability``, ``lambda_n`` for the modes in
-    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources, ``pressure_pa`` when it has scales.
+    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources, ``pressure_pa`` when it has scales, ``fraction_`` of
+    the area for each kind of zone if it asks for ``wrinkling``.
     """
     scene = branch.scene
     controls = [c for c in CONTROLS if c in scene.analysis.stability]
@@ -35,6 +38,7 @@ def columns(branch: Branch) -> list[str]:
         *(f"verdict_{c}" for c in controls),
         *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),
         *(["pressure_pa"] if scene.scales else []),
+        *((f"fraction_{kind}" for kind in KINDS) if scene.analysis.wrinkling else ()),
         *("residual", "iterations", "seconds"),
     ]
 
@@ -52,6 +56,8 @@ def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str
     scales = equilibrium.scene.scales
     if column == "pressure_pa" and scales is not None:
         return scales.to_si("pressure", equilibrium.pressure)
+    if kind == "fraction":
+        return equilibrium.zones().fraction(name)
     if column == "iterations":
         return int(equilibrium.iterations)
     return float(getattr(equilibrium, column))
@@ -83,6 +89,18 @@ def special_point_columns(branch: Branch) -> list[str]:
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the special points; no rows means that the branch was searched and has none."""
     _write(path, special_point_columns(branch), special_point_rows(branch))
+
+
+def zone_rows(branch: Branch) -> Iterator[list[Any]]:
+    """One row for each zone of each equilibrium, from the pole to the rim, in the order of :data:`ZONE_COLUMNS`."""
+    for step, equilibrium in enumerate(branch):
+        for zone in equilibrium.zones():
+            yield [step, zone.kind, *zone.r, *zone.rho, zone.area_fraction, zone.deformed_area_fraction]
+
+
+def write_zones_csv(branch: Branch, path: str | PathLike[str]) -> None:
+    """Write the zones by the criterion of the scene."""
+    _write(path, list(ZONE_COLUMNS), zone_rows(branch))
 
 
 def to_dataframe(branch: Branch) -> pandas.DataFrame:

@@ -6,6 +6,8 @@ its sources first, then their energy is turned on at constant volume.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import SolveError, Status
@@ -59,17 +61,12 @@ def start_at_volume(potential: Potential, volume: float) -> State:
         When the path ends before the full strength of the sources, or a dome cannot be inflated to the volume.
     """
     magnetic = bool(potential.sources)
-    failure: SolveError | None = None
     if magnetic and abs(volume) < START_VOLUME:
-        # from the side of the wanted volume first, so that a mirrored scene takes the mirrored path
-        side = float(np.copysign(START_VOLUME, volume))
-        for first in (side, -side):
-            try:
-                return march(potential, start_at_volume(potential, first), VolumeControl, first, volume)[-1]
-            except SolveError as error:
-                failure = failure or error
-        if volume == 0 and failure is not None:  # nowhere to turn the sources on but at the flat state itself
-            raise failure
+        try:
+            return _from_either_side(volume, lambda first, state: march(potential, state, VolumeControl, first, volume)[-1], potential)
+        except SolveError:
+            if volume == 0:  # nowhere to turn the sources on but at the flat state itself
+                raise
     state = _inflated(potential, volume)
     if not magnetic:
         return state
@@ -135,9 +132,27 @@ def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
     if height == 0 and not potential.sources:
         return flat_state(potential)
-    state = start_at_volume(potential, float(np.copysign(START_VOLUME, height)))
-    here = potential.space.center_height(state.x)
-    return march(potential, state, CenterHeightControl, here, height)[-1] if height != here else state
+
+    def follow(_: float, state: State) -> State:
+        here = potential.space.center_height(state.x)
+        return march(potential, state, CenterHeightControl, here, height)[-1] if height != here else state
+
+    return _from_either_side(height, follow, potential)
+
+
+def _from_either_side(load: float, follow: Callable[[float, State], State], potential: Potential) -> State:
+    """The state that is reached from the membrane moderately inflated to the side of a load, or else to the other side.
+
+    The side of the load comes first, so that a mirrored scene takes the mirrored path.
+    """
+    side = float(np.copysign(START_VOLUME, load))
+    try:
+        return follow(side, start_at_volume(potential, side))
+    except SolveError as failure:
+        try:
+            return follow(-side, start_at_volume(potential, -side))
+        except SolveError:
+            raise failure from None
 
 
 def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, steps: int = 300) -> State | None:

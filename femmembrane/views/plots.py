@@ -1,4 +1,4 @@
-"""Plots of a branch: pressure against volume with its verdicts, and deformed meridians.
+"""Plots of a branch: pressure against volume with its verdicts, deformed meridians, and wrinkling zones.
 
 ``plot_...`` make a whole figure; ``draw_...`` draw onto given axes, for figures of one's own. Figures are made without pyplot, so that
 nothing global changes and no window opens. Line style and marker shape carry all that colour does: the figures read the same in grey.
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, Status, unknown_name
 from ..results.store import replace_file
 from .vtk import smooth_profile
+from .zones import BRANCH_WIDTH, PATTERNS, draw_along, draw_meridian_zones, fill_zones, new_label, shown_kinds, zone_label, zone_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,7 +101,7 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     return save_figure(figure, path)
 
 
-def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count: int = 6) -> Figure:
+def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count: int = 6, *, zones: bool | None = None) -> Figure:
     """Deformed meridians of some equilibria, evenly spread along the branch, with the magnetic sources.
 
     Parameters
@@ -111,6 +112,8 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
         Picture to write; the suffix chooses the format.
     count : int
         Number of meridians, first and last equilibrium included.
+    zones : bool, optional
+        Mark the wrinkled parts; by default when the scene asks for wrinkling.
 
     Raises
     ------
@@ -128,10 +131,41 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
     colors = colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2)))
     for equilibrium, color in zip(shown, colors, strict=False):
         label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
-        draw_profile(axes, equilibrium, Style(label, _SOLID, color))
+        draw_profile(axes, equilibrium, Style(label, _SOLID, color), zones=zones)
     draw_surroundings(axes, shown)
-    handles, labels = axes.get_legend_handles_labels()
-    axes.legend(handles[::-1], labels[::-1], loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
+    axes.set_anchor("W")  # the legend stands on the right
+    handles, labels = legend_entries(axes)
+    look: dict[str, Any] = {"bbox_to_anchor": (1.01, 0.5), "frameon": False, "fontsize": 9, "handlelength": 3.2}
+    axes.legend(handles[::-1], labels[::-1], loc="center left", **look)
+    return save_figure(figure, path)
+
+
+def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
+    """Taut and wrinkled zones: reference radius against volume, or against the step where the volume is not monotone.
+
+    Parameters
+    ----------
+    branch : Branch
+        With one or more equilibria; the criterion is its scene's ("total" if that asks for none).
+    path : path, optional
+        Picture to write; the suffix chooses the format.
+
+    Raises
+    ------
+    InputError
+        For an empty branch or a file that cannot be written.
+    """
+    _require_equilibria(branch)
+    figure, axes = new_figure((6.4, 4.2), title=branch.scene.title)
+    volume = np.array([equilibrium.volume for equilibrium in branch])
+    order = np.sign(volume[-1] - volume[0]) or 1.0
+    monotone = volume.size > 1 and bool((np.diff(order * volume) > 0).all())
+    shown = branch[:: int(order)] if monotone else branch
+    handles = fill_zones(axes, shown, np.sort(volume) if monotone else np.arange(volume.size, dtype=float))
+    axes.set_xlabel(VOLUME_LABEL if monotone else "step")
+    axes.set_ylabel("reference radius r/R₀")
+    axes.margins(0)
+    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
     return save_figure(figure, path)
 
 
@@ -185,9 +219,9 @@ def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
 
 
 def legend_entries(axes: Axes) -> tuple[list[Any], list[str]]:
-    """Handles and labels of what is named, the verdicts first and always in the same order."""
+    """Handles and labels of what is named, the verdicts first, then wrinkles, and these always in the same order."""
     named = list(zip(*axes.get_legend_handles_labels(), strict=True))
-    named.sort(key=lambda item: _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER))
+    named.sort(key=lambda item: _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER) + zone_order(item[1]))
     return [handle for handle, _ in named], [label for _, label in named]
 
 
@@ -212,8 +246,9 @@ def draw_branch(
     """One quantity of a branch against another: verdicts as line styles, special points as markers, snaps as arrows.
 
     A style changes at the special point where the verdict does, or half-way between two equilibria. A branch whose scene asks for no
-    verdicts is one plain line. Stretches that are unstable to an azimuthal mode have a grey band behind them; a cross marks the end of a
-    branch that could not be followed as far as was asked.
+    verdicts is one plain line. Stretches that are unstable to an azimuthal mode have a grey band behind them; if the scene asks for
+    wrinkling, patterns on both sides of the line say which wrinkles the membrane has anywhere. A cross marks the end of a branch that
+    could not be followed as far as was asked.
 
     Parameters
     ----------
@@ -250,6 +285,8 @@ def draw_branch(
             axes.plot(*point, ".", color=(style or _style(word)).color, markersize=6 if len(points) < 3 else 4, zorder=3)
     if not style:
         _draw_azimuthal(axes, branch, points, gaps)
+        if branch.scene.analysis.wrinkling:
+            _draw_wrinkling(axes, branch, points, gaps)
     _draw_jumps(axes, branch, (across, up))
     if special_points:
         _draw_special_points(axes, branch, (across, up))
@@ -376,7 +413,7 @@ def _draw_lines(axes: Axes, pieces: Sequence[_Segment | None], classify: Callabl
     for style, line in _lines(pieces, classify):
         # the caps of neighbouring dashes may not run into each other
         look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
-        axes.plot(*line.T, label=_new(axes, style.label), zorder=3, **look)
+        axes.plot(*line.T, label=new_label(axes, style.label), zorder=3, **look)
 
 
 def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
@@ -384,9 +421,17 @@ def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_G
     words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
     for lost, line in _lines(_segments(points, words, gaps), lambda w: tuple(n for n, word in w.items() if word == "unstable")):
         if lost:
-            label = _new(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
+            label = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
             grey = str(max(0.84 - 0.14 * (len(lost) - 1), 0.4))
             axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=label)
+
+
+def _draw_wrinkling(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
+    """Patterns behind the stretches on which the membrane is wrinkled somewhere."""
+    words: list[dict[Any, str]] = [{kind: kind * (kind in shown_kinds(e.zones())) for kind in PATTERNS} for e in branch]
+    for kinds, line in _lines(_segments(points, words, gaps), lambda w: tuple(filter(None, w.values()))):
+        for kind in kinds:
+            draw_along(axes, line, kind, zone_label(branch.scene, kind), BRANCH_WIDTH)
 
 
 def _draw_jumps(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
@@ -397,7 +442,7 @@ def _draw_jumps(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
         if id(jump.landing) in before:
             tail, tip = _coordinates([jump.limit or before[id(jump.landing)], jump.landing], quantities)
             axes.annotate("", xy=tip, xytext=tail, arrowprops=arrow, zorder=4)
-            axes.plot([], [], color=_RED, linewidth=1.6, label=_new(axes, "snap"))
+            axes.plot([], [], color=_RED, linewidth=1.6, label=new_label(axes, "snap"))
 
 
 def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
@@ -406,22 +451,19 @@ def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) 
         marker, label = MARKERS.get(kind, ("X", kind.replace("_", " ")))
         places = _coordinates([p for p in points if str(p.kind) == kind], quantities)
         look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
-        axes.plot(*places.T, marker, label=_new(axes, label), zorder=4, **look)
+        axes.plot(*places.T, marker, label=new_label(axes, label), zorder=4, **look)
     for point, place in zip(points, _coordinates(points, quantities), strict=True):
         if point.azimuthal:
             axes.annotate(f"n = {point.azimuthal}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, zorder=5)
 
 
-def _new(axes: Axes, label: str) -> str | None:
-    """A label, unless the legend has it already."""
-    return label if label and label not in axes.get_legend_handles_labels()[1] else None
-
-
 # --- meridians
 
 
-def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style) -> None:
-    """The deformed meridian, both halves, under the style's label."""
+def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style, *, zones: bool | None = None) -> None:
+    """The deformed meridian, both halves, under the style's label; with the wrinkled zones, by default when the scene asks for them."""
+    if equilibrium.scene.analysis.wrinkling if zones is None else zones:
+        draw_meridian_zones(axes, equilibrium)
     profile = smooth_profile(equilibrium, points=_CURVE)
     rho, eta = profile["rho"], profile["eta"]
     look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}

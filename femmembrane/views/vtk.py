@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
 
 Array = NDArray[np.float64]
+_Number = TypeVar("_Number", np.float64, np.int32)
 
 #: profile quantities that a file shows as point data, in this order; those in Pa when the scene has scales
 FIELDS = (
@@ -95,7 +96,7 @@ class Revolution:
         radial = radial[self.node]
         return np.stack([radial * self.cosine, radial * self.sine, vertical[self.node]], axis=1)
 
-    def scalars(self, values: Array) -> Array:
+    def scalars(self, values: NDArray[_Number]) -> NDArray[_Number]:
         """Values at the points from values at the nodes."""
         return values[self.node]
 
@@ -103,7 +104,8 @@ class Revolution:
 def write_vtk(branch: Branch, path: str | PathLike[str]) -> list[Path]:
     """Write one VTU file an equilibrium and the PVD file that strings them together for ParaView.
 
-    The VTU files go to a folder beside ``path``, named like it. Time is the step number; volume and pressure are cell data.
+    The VTU files go to a folder beside ``path``, named like it. Time is the step number; volume and pressure are cell data. When the
+    scene asks for wrinkling, ``zone`` is 0 at taut points, 1, 2, 3 where wrinkles run along meridians, along circles, both ways.
     VTU files of a longer branch written to the same place before are removed.
 
     Returns
@@ -222,6 +224,8 @@ def _write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file:
     R, Z = equilibrium.scene.mesh.position(equilibrium.potential.space.node_parameters())
     point_data = {"displacement": revolution.vectors(rho - R, eta - Z)}
     point_data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
+    if equilibrium.scene.analysis.wrinkling:
+        point_data["zone"] = revolution.scalars(equilibrium.zones().numbers(equilibrium.potential.space.node_parameters()).astype(np.int32))
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     mesh = meshio.Mesh(
         revolution.vectors(rho, eta),

@@ -1,0 +1,87 @@
+"""Where the points of a meridian lie in a state of the membrane, how they are stretched and what they carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..discretization.space import space_of
+from ..physics.kinematics import meridional_strain
+from ..physics.magnetics import magnetic_field
+from ..physics.scales import Scales
+from ..physics.stress import total_stress
+from ..physics.tension_field import strain_energy
+from ..scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Points of the deformed meridian, all arrays of shape (n,); 1 is the meridional direction, 2 the circumferential.
+
+    Attributes
+    ----------
+    r : ndarray
+        Reference radius over R0.
+    rho, eta : ndarray
+        Deformed radius and height over R0.
+    strain : (ndarray, ndarray)
+        Hencky strains (e_1, e_2).
+    mechanical, total : (ndarray, ndarray)
+        Principal Cauchy stresses in units of mu (:mod:`~femmembrane.physics.stress`).
+    """
+
+    r: Array
+    rho: Array
+    eta: Array
+    strain: tuple[Array, Array]
+    mechanical: tuple[Array, Array]
+    total: tuple[Array, Array]
+
+    def columns(self, scales: Scales | None = None) -> dict[str, Array]:
+        """The profile by the names of its columns, with stretches in place of strains, and the stresses in Pa too if there are scales."""
+        columns = {
+            "r": self.r,
+            "rho": self.rho,
+            "eta": self.eta,
+            "stretch_1": np.exp(self.strain[0]),
+            "stretch_2": np.exp(self.strain[1]),
+            "mechanical_stress_1": self.mechanical[0],
+            "mechanical_stress_2": self.mechanical[1],
+            "total_stress_1": self.total[0],
+            "total_stress_2": self.total[1],
+        }
+        if scales is not None:
+            columns |= {f"{name}_pa": scales.to_si("stress", columns[name]) for name in list(columns) if "stress" in name}
+        return columns
+
+
+def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
+    """The profile of a state at parameters s of the meridian, on the axis its limits.
+
+    Parameters
+    ----------
+    scene : Scene
+    x : ndarray, shape (n_free,)
+        Displacement coefficients.
+    pressure : float
+        P = p R0/(mu T); enters the total stresses only.
+    s : ndarray, shape (n,)
+    """
+    space = space_of(scene.mesh, scene.degree)
+    u, _, w, _ = space.evaluate(x, s)
+    u_s, w_s = space.recovered_slopes(x, s)
+    (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
+    pole = R == 0  # there u/R is the limit u_s/R_s
+    e1 = meridional_strain(R_s, Z_s, u_s, w_s)
+    e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
+    rho, eta = R + u, Z + w
+    mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
+    h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0)
+    slope = np.hypot(R_s + u_s, Z_s + w_s)
+    tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
+    total = total_stress(mechanical, pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
+    return Profile(R, rho, eta, (e1, e2), mechanical, total)

@@ -1,0 +1,255 @@
+"""Wrinkling zones: where along the meridian the principal stresses are compressive (paper eqs. 46-56, figure 7).
+
+::
+
+    kind               s_11    s_22     wrinkles run
+    taut               >= 0    >= 0     nowhere
+    radial             >= 0    <  0     along meridians, as spokes
+    circumferential    <  0    >= 0     along circles
+    double             <  0    <  0     both ways; in a tension field: slack
+
+The criterion says which stresses decide: "total" ones (the paper's) or the "mechanical" ones that the strain energy feels. In a tension
+field the mechanical stress across wrinkles is exactly zero; there the strain beyond natural width has the sign that decides::
+
+    g_1 = e_1 + max(e_2, 0)/2,      g_2 = e_2 + max(e_1, 0)/2
+
+which vanishes where the membrane stops being taut, as the stress of the plain material does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..discretization.space import Space, space_of
+from ..errors import unknown_name
+from ..scene import WRINKLING, Scene
+from .profile import Profile, profile_at
+
+Array = NDArray[np.float64]
+
+#: kinds of zones; the place of each is its number, the sum of _BITS of what is compressive
+KINDS = ("taut", "radial", "circumferential", "double")
+#: what compressive s_11 and s_22 add to the number of a kind
+_BITS = (2, 1)
+#: points at which the signs are looked at in each element, both ends included
+_SAMPLES = 13
+#: rounds of dividing an interval with a root, and parts each time; what is left is shorter than _SLIVER
+_ROUNDS, _PARTS = 5, 32
+#: zones shorter than this part of the meridian are round-off of a border
+_SLIVER = 1e-10
+
+#: parameters of the meridian to the two stresses whose signs decide
+_Stresses = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A part of the membrane between two circles with the same signs of the principal stresses.
+
+    Attributes
+    ----------
+    kind : {"taut", "radial", "circumferential", "double"}
+    r, rho : (float, float)
+        Reference and deformed radii over R0 at its start and end, seen from the pole.
+    area_fraction, deformed_area_fraction : float
+        Its part of the reference and of the deformed area.
+    s : (float, float)
+        Parameters of the meridian at its start and end; those of a disc are the reference radii.
+    """
+
+    kind: str
+    r: tuple[float, float]
+    rho: tuple[float, float]
+    area_fraction: float
+    deformed_area_fraction: float
+    s: tuple[float, float] = field(repr=False)
+
+    def __str__(self) -> str:
+        (r0, r1), (rho0, rho1) = self.r, self.rho
+        where = f"r = {r0:<7.4g} to {r1:<7.4g} rho = {rho0:<7.4g} to {rho1:<7.4g}"
+        return f"{self.kind:<16}{where}{self.area_fraction:>8.2%} of the area ({self.deformed_area_fraction:.2%} deformed)"
+
+
+@dataclass(frozen=True)
+class Zones(Sequence[Zone]):
+    """The zones of an equilibrium, from the pole to the rim; together they are the whole membrane.
+
+    Attributes
+    ----------
+    criterion : {"total", "mechanical"}
+        The stresses that decide.
+    zones : tuple of Zone
+        One or more; neighbours are of different kinds.
+    """
+
+    criterion: str
+    zones: tuple[Zone, ...]
+
+    def __len__(self) -> int:
+        return len(self.zones)
+
+    @overload
+    def __getitem__(self, index: int) -> Zone: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Zone, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Zone | tuple[Zone, ...]:
+        return self.zones[index]
+
+    def __iter__(self) -> Iterator[Zone]:
+        return iter(self.zones)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kind of each zone."""
+        return tuple(zone.kind for zone in self)
+
+    @property
+    def borders(self) -> tuple[float, ...]:
+        """Reference radii at which one zone ends and the next begins."""
+        return tuple(zone.r[1] for zone in self.zones[:-1])
+
+    def fraction(self, kind: str) -> float:
+        """Part of the reference area that is of a kind.
+
+        Raises
+        ------
+        InputError
+            For an unknown kind.
+        """
+        if kind not in KINDS:
+            raise unknown_name("kind", kind, KINDS)
+        return float(sum(zone.area_fraction for zone in self if zone.kind == kind))
+
+    def numbers(self, s: ArrayLike) -> NDArray[np.int64]:
+        """Kinds at parameters s of the meridian, as their places in KINDS (0 taut ... 3 double); a border is of the zone outside it."""
+        kinds = np.array([KINDS.index(kind) for kind in self.kinds])
+        return kinds[np.searchsorted([zone.s[1] for zone in self.zones[:-1]], s, side="right")]
+
+    @property
+    def summary(self) -> str:
+        """In a few words: taut, or each kind of wrinkles with its part of the reference area."""
+        found = [f"{kind} {100 * self.fraction(kind):.3g}%" for kind in KINDS[1:] if kind in self.kinds]
+        return ", ".join(found) or "taut"
+
+    def __str__(self) -> str:
+        return "\n".join([f"zones by the signs of the {self.criterion} stresses", *(f"  {zone}" for zone in self)])
+
+
+def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones:
+    """The zones of the state x under a pressure, with borders located inside the elements.
+
+    Signs are looked at in 13 points of each element and borders found between them as roots: a zone thinner than about a tenth of an
+    element may be missed. From degree 4 on stresses jump at the ends of elements, where they may then also change sign. The cost grows
+    with the number of elements.
+
+    Parameters
+    ----------
+    scene : Scene
+    x : ndarray, shape (n_free,)
+        Displacement coefficients.
+    pressure : float
+        P = p R0/(mu T); enters total stresses only.
+    criterion : {"total", "mechanical"}
+
+    Raises
+    ------
+    InputError
+        For an unknown criterion.
+    """
+    if not isinstance(criterion, str) or criterion not in WRINKLING:
+        raise unknown_name("criterion", criterion, WRINKLING)
+
+    def deciding(s: Array) -> tuple[Array, Array]:
+        profile = profile_at(scene, x, pressure, s)
+        return profile.total if criterion == "total" else _mechanical(profile, scene.tension_field)
+
+    codes, edges = _tiles(space_of(scene.mesh, scene.degree), deciding)
+    area, deformed = _areas(scene, x, pressure, edges)
+    ends = profile_at(scene, x, pressure, edges)
+    r, rho, s = (list(zip(v[:-1].tolist(), v[1:].tolist(), strict=True)) for v in (ends.r, ends.rho, edges))
+    parts = zip(codes, r, rho, area.tolist(), deformed.tolist(), s, strict=True)
+    return Zones(criterion, tuple(Zone(KINDS[code], *rest) for code, *rest in parts))
+
+
+def _mechanical(profile: Profile, tension_field: bool) -> tuple[Array, Array]:
+    if not tension_field:
+        return profile.mechanical
+    e1, e2 = profile.strain
+    return e1 + np.maximum(e2, 0) / 2, e2 + np.maximum(e1, 0) / 2
+
+
+def _tiles(space: Space, deciding: _Stresses) -> tuple[list[int], Array]:
+    """Number of the kind of each zone, and the parameters at their ends, one more."""
+    s = _samples(space)
+    compressive = np.stack(deciding(s)) < 0
+    start, end = s[[0, -1]].tolist()
+    codes, starts = [int(np.dot(_BITS, compressive[:, 0]))], [start]
+    for place, bit in _changes(s, compressive, deciding):
+        code = codes[-1] ^ bit
+        if place - starts[-1] <= _SLIVER * (end - start):
+            codes[-1] = code
+        elif end - place > _SLIVER * (end - start):
+            codes.append(code)
+            starts.append(place)
+    new = [k for k in range(len(codes)) if k == 0 or codes[k] != codes[k - 1]]
+    return [codes[k] for k in new], np.array([*(starts[k] for k in new), end])
+
+
+def _changes(s: Array, compressive: NDArray[np.bool_], deciding: _Stresses) -> list[tuple[float, int]]:
+    """Where a stress changes sign between samples, in order, with the bit of that stress."""
+    which, left = np.nonzero(compressive[:, 1:] != compressive[:, :-1])
+    if not which.size:
+        return []
+    places = s[left + 1]  # where two elements meet nothing lies between the samples
+    inside = (left + 1) % _SAMPLES != 0
+    negative = compressive[which, left]
+    if inside.any():
+        places[inside] = _roots(deciding, which[inside], s[left][inside], s[left + 1][inside], negative[inside])
+    return sorted(zip(places.tolist(), np.take(_BITS, which).tolist(), strict=True))
+
+
+def _roots(deciding: _Stresses, which: NDArray[np.int64], a: Array, b: Array, negative: NDArray[np.bool_]) -> Array:
+    """Roots of the stresses ``which`` between a and b, ``negative`` telling their signs at a.
+
+    One point at a time costs as much as hundreds at once: so all intervals are narrowed together, and the last step is a secant.
+    """
+    column = np.arange(a.size)
+    for _ in range(_ROUNDS):
+        s = np.linspace(a, b, _PARTS + 1)
+        values = np.stack(deciding(s.ravel())).reshape(2, *s.shape)[which, :, column].T
+        # the signs at a and b are known: evaluated again, a zero there may come out with the other one
+        other = (values[1:] < 0) != negative
+        other[-1] = True
+        k = np.argmax(other, axis=0)
+        a, b, at_a, at_b = s[k, column], s[k + 1, column], values[k, column], values[k + 1, column]
+    share = np.divide(at_a, at_a - at_b, out=np.zeros_like(a), where=at_a != at_b)
+    return a + np.clip(share, 0, 1) * (b - a)
+
+
+def _samples(space: Space) -> Array:
+    """Increasing parameters, the same number in each element; the last one of an element is the last number before its end."""
+    last = np.append(np.nextafter(space.ends[1:-1], -np.inf), space.ends[-1])
+    return np.linspace(space.ends[:-1], last, _SAMPLES, axis=1).ravel()
+
+
+def _areas(scene: Scene, x: Array, pressure: float, edges: Array) -> tuple[Array, Array]:
+    """Parts of the reference and of the deformed area between neighbouring edges, each of shape (len(edges) - 1,)."""
+    space = space_of(scene.mesh, scene.degree)
+    ends = np.union1d(space.ends, edges)
+    points, weights = np.polynomial.legendre.leggauss(space.degree + 3)
+    s = ends[:-1, None] + np.diff(ends)[:, None] * (points + 1) / 2
+    profile = profile_at(scene, x, pressure, s.ravel())
+    area = profile.r * np.hypot(*space.mesh.tangent(s.ravel())) * (np.diff(ends)[:, None] * weights).ravel()
+    zone = np.searchsorted(edges[1:-1], s.ravel())
+    fractions = []
+    for density in (area, area * np.exp(profile.strain[0] + profile.strain[1])):
+        parts = np.bincount(zone, density, edges.size - 1)
+        fractions.append(parts / parts.sum())
+    return fractions[0], fractions[1]

@@ -102,10 +102,10 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        space = self.potential.space
-        s = space.node_parameters() if r is None else _radii(r, space.mesh.breakpoints())
         from ..stability.profile import profile_at
 
+        space = self.potential.space
+        s = space.node_parameters() if r is None else _radii(r, space.mesh.breakpoints())
         return profile_at(self.scene, self.state, self.pressure, s).columns()
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:

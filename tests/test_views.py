@@ -366,6 +366,15 @@ def test_meridian_shows_its_zones(branch: Branch) -> None:
     assert bands(axes).keys() == {"double", "radial"}
 
 
+def test_labels_say_what_decides() -> None:
+    scene = SCENE.replace(analysis=Analysis(wrinkling="mechanical"))
+    kinds = ("taut", "radial", "double")
+    plain = ["taut", "radial wrinkles (mechanical s22 < 0)", "double wrinkles (mechanical s11, s22 < 0)"]
+    assert [zones.zone_label(scene, kind) for kind in kinds] == plain
+    relaxed = ["taut", "radial wrinkles (no tension across)", "double wrinkles (slack)"]
+    assert [zones.zone_label(scene.replace(tension_field=True), kind) for kind in kinds] == relaxed
+
+
 def test_patterns_differ_without_colour() -> None:
     looks = [(p.core, p.ink, str(p.dashes), p.hatch) for p in zones.PATTERNS.values()]
     assert len(set(looks)) == len({p.hatch for p in zones.PATTERNS.values()}) == 4
@@ -405,7 +414,7 @@ def test_zones_picture(branch: Branch, tmp_path: Path) -> None:
 
 
 def test_zones_against_steps(branch: Branch) -> None:
-    """A branch that turns back in volume is shown by its steps; one that goes down is shown from small volumes to large."""
+    """A branch that turns back in volume is shown by its steps; one that goes down in volume looks like one that goes up."""
     shown = wrinkled(branch)
     back = dataclasses.replace(shown, equilibria=(*shown.equilibria, shown[1]))
     (axes,) = plots.plot_zones(back).axes
@@ -413,9 +422,23 @@ def test_zones_against_steps(branch: Branch) -> None:
     assert axes.get_xlim() == pytest.approx((0, 4))
     (axes,) = plots.plot_zones(dataclasses.replace(shown, equilibria=shown.equilibria[::-1])).axes
     (same,) = plots.plot_zones(shown).axes
-    assert [line.get_xydata().tolist() for line in axes.lines] == [line.get_xydata().tolist() for line in same.lines]
+    drawn, expected = (np.array(sorted(p for line in a.lines for p in line.get_xydata().tolist())) for a in (axes, same))
+    np.testing.assert_allclose(drawn, expected, atol=1e-9)
+    assert axes.get_xlim() == same.get_xlim()
     (axes,) = plots.plot_zones(shown[:1]).axes
     assert axes.get_xlim() == pytest.approx((-0.5, 0.5))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_no_zones_within_a_snap(branch: Branch, order: int) -> None:
+    """Between two parts of a branch there are no states to interpolate: zones change half-way, and borders keep their radii till there."""
+    shown = wrinkled(branch)
+    equilibria = shown.equilibria[:2][::order]
+    snapping = dataclasses.replace(shown, equilibria=equilibria, jumps=(Jump(1, None, equilibria[1]),))
+    (axes,) = plots.plot_zones(snapping).axes
+    first, middle = shown[0].volume, (shown[0].volume + shown[1].volume) / 2
+    expected = [sorted([x, border] for x in (first, first, middle)) for border in shown[0].zones().borders]
+    assert [sorted(line.get_xydata().tolist()) for line in axes.lines] == expected
 
 
 def test_plots_refuse(branch: Branch) -> None:

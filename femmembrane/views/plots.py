@@ -158,10 +158,9 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.2), title=branch.scene.title)
     volume = np.array([equilibrium.volume for equilibrium in branch])
-    order = np.sign(volume[-1] - volume[0]) or 1.0
-    monotone = volume.size > 1 and bool((np.diff(order * volume) > 0).all())
-    shown = branch[:: int(order)] if monotone else branch
-    handles = fill_zones(axes, shown, np.sort(volume) if monotone else np.arange(volume.size, dtype=float))
+    steps = np.diff(volume)
+    monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
+    handles = fill_zones(axes, branch, volume if monotone else np.arange(volume.size, dtype=float))
     axes.set_xlabel(VOLUME_LABEL if monotone else "step")
     axes.set_ylabel("reference radius r/R₀")
     axes.margins(0)
@@ -247,7 +246,7 @@ def draw_branch(
 
     A style changes at the special point where the verdict does, or half-way between two equilibria. A branch whose scene asks for no
     verdicts is one plain line. Stretches that are unstable to an azimuthal mode have a grey band behind them; if the scene asks for
-    wrinkling, patterns on both sides of the line say which wrinkles the membrane has anywhere. A cross marks the end of a branch that
+    wrinkling, bands with patterned edges say which wrinkles the membrane has anywhere. A cross marks the end of a branch that
     could not be followed as far as was asked.
 
     Parameters

@@ -76,8 +76,10 @@ def zone_label(scene: Scene, kind: str) -> str:
     pattern, criterion = PATTERNS[kind], scene.analysis.wrinkling or "total"
     if kind == "taut":
         return pattern.name
-    relaxed = scene.tension_field and criterion == "mechanical"
-    return f"{pattern.name} ({'no tension across' if relaxed else f'{criterion} {pattern.compressed} < 0'})"
+    why = f"{criterion} {pattern.compressed} < 0"
+    if scene.tension_field and criterion == "mechanical":  # where no stress is ever negative
+        why = "slack" if kind == "double" else "no tension across"
+    return f"{pattern.name} ({why})"
 
 
 def zone_order(label: str) -> int:
@@ -123,12 +125,13 @@ def shown_kinds(zones: Zones) -> tuple[str, ...]:
 def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     """The zones of a branch as filled regions, reference radius upwards.
 
-    Borders go straight from one equilibrium to the next; where the kinds of zones change, the states between are interpolated.
+    Borders go straight from one equilibrium to the next; where the kinds of zones change, the states between are interpolated, but for
+    a snap, which has none.
 
     Parameters
     ----------
     across : ndarray, shape (len(branch),)
-        Place of each equilibrium along the other axis, increasing.
+        Place of each equilibrium along the other axis, monotone.
 
     Returns
     -------

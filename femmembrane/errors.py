@@ -31,6 +31,11 @@ class Status(StrEnum):
     def advice(self) -> str:
         return _ADVICE[self]
 
+    @property
+    def ill_posed(self) -> bool:
+        """Whether the state depends on the mesh: compressed along the meridian, or slack in a tension field."""
+        return self in (Status.LEGENDRE_FAILURE, Status.SLACK)
+
 
 _ADVICE = {
     Status.CONVERGED: "residual and constraint were recomputed and are at round-off",

@@ -287,9 +287,10 @@ def test_early_end_is_marked(branch: Branch) -> None:
         assert cross.get_xydata().tolist() == [[branch[-1].volume, branch[-1].pressure]]
 
 
-def test_ill_posed_stretch_is_not_judged(branch: Branch) -> None:
-    marked = tuple(dataclasses.replace(e, status=Status.LEGENDRE_FAILURE) if k > 1 else e for k, e in enumerate(branch))
-    assert "ill-posed (Legendre condition fails)" in styles(plots.plot_pressure_volume(dataclasses.replace(branch, equilibria=marked)))
+@pytest.mark.parametrize("status", [Status.LEGENDRE_FAILURE, Status.SLACK])
+def test_ill_posed_stretch_is_not_judged(branch: Branch, status: Status) -> None:
+    marked = tuple(dataclasses.replace(e, status=status) if k > 1 else e for k, e in enumerate(branch))
+    assert "ill-posed (compressed or slack)" in styles(plots.plot_pressure_volume(dataclasses.replace(branch, equilibria=marked)))
 
 
 def test_draw_branch_onto_axes(branch: Branch) -> None:

@@ -59,8 +59,8 @@ MARGINAL = Style("marginal (an eigenvalue is zero)", (0, (6, 1.5, 1, 1.5)), _BLA
 BOTH = Style("stable under both controls", _SOLID, _BLUE)
 VOLUME_ONLY = Style("stable under volume control only", _DASHED, _ORANGE)
 UNSTABLE = Style("unstable under both controls", _DOTTED, _BLACK, 2.2)
-#: compressive meridional stress: what a mesh finds there depends on the mesh, stable or not
-ILL_POSED = Style("ill-posed (Legendre condition fails)", _DOTTED, "#888888", 1.2)
+#: compressed or slack along the meridian: what a mesh finds there depends on the mesh, stable or not
+ILL_POSED = Style("ill-posed (compressed or slack)", _DOTTED, "#888888", 1.2)
 #: when one control alone was asked for
 STABLE_UNDER = {c: Style(f"stable under {c} control", _SOLID, _BLUE) for c in ("pressure", "volume")}
 UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", _DOTTED, _BLACK, 2.2) for c in ("pressure", "volume")}
@@ -296,9 +296,9 @@ def draw_branch(
 def _words(branch: Branch, controls: Sequence[str]) -> list[dict[Any, str]]:
     """The verdicts of each equilibrium under the controls asked for."""
     words: list[dict[Any, str]] = [
-        {c: _ILL_POSED if e.status is Status.LEGENDRE_FAILURE else e.verdict(c).word for c in controls} for e in branch
+        {c: _ILL_POSED if e.status.ill_posed else e.verdict(c).word for c in controls} for e in branch
     ]
-    if branch.status is Status.LEGENDRE_FAILURE:  # a cross marks that one
+    if branch.status.ill_posed:  # a cross marks that one
         words[-1] = words[max(len(words) - 2, 0)]
     return words
 
@@ -416,12 +416,14 @@ def _draw_lines(axes: Axes, pieces: Sequence[_Segment | None], classify: Callabl
 
 
 def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
-    """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them."""
+    """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them, and for shorter waves."""
     words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
-    for lost, line in _lines(_segments(points, words, gaps), lambda w: tuple(n for n, word in w.items() if word == "unstable")):
+    lines = list(_lines(_segments(points, words, gaps), lambda w: tuple(n for n, word in w.items() if word == "unstable")))
+    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), lost))
+    for lost, line in lines:
         if lost:
             label = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
-            grey = str(max(0.84 - 0.14 * (len(lost) - 1), 0.4))
+            grey = str(max(0.84 - 0.14 * order.index(lost), 0.4))
             axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=label)
 
 

@@ -23,6 +23,7 @@ from femmembrane.potential import Potential
 from femmembrane.solve.controls import VolumeControl
 from femmembrane.solve.newton import correct
 from femmembrane.solve.start import spherical_dome
+from femmembrane.stability.zones import find_zones
 
 OGDEN = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
 BOTH = ("pressure", "volume")
@@ -81,6 +82,29 @@ def trace_table(repeat: int) -> dict[tuple[int, int], float]:
     return errors
 
 
+def effects_table(repeat: int) -> None:
+    """What an effect costs when it is on: operations at a point, and one evaluation of value, gradient and Hessian; and wrinkling zones."""
+    dipole = scene(64)
+    scenes = {
+        "no dipole": dipole.replace(sources=(), susceptibility=None),
+        "dipole": dipole,
+        "dipole, tension field": dipole.replace(tension_field=True),
+    }
+    states = {name: fm.equilibrium(s, volume=2.0, solver="newton") for name, s in scenes.items()}
+    times: dict[str, list[float]] = {name: [] for name in states}
+    for _ in range(3 * repeat):  # in turns, so that all see the same neighbours on the machine
+        for name, eq in states.items():
+            clock = time.perf_counter()
+            for _ in range(100):
+                eq.potential.evaluate(eq.state, eq.pressure)
+            times[name].append((time.perf_counter() - clock) / 100)
+    print(f"\nEffects, 64 quadratic elements                             {'operations':>10} {'ms each':>8}")
+    for name, eq in states.items():
+        print(f"  {name:<54} {eq.potential.operations:>12} {statistics.median(times[name]) * 1e3:>8.3f}")
+    total = seconds(lambda: find_zones(dipole, states["dipole"].state, states["dipole"].pressure, "total"), 3 * repeat)
+    print(f"  {'wrinkling zones of one equilibrium':<54} {'':>12} {total * 1e3:>8.3f}")
+
+
 def growth_table(sizes: Sequence[int], repeat: int) -> None:
     """Set-up and one equilibrium from a dome against the number of quadratic elements."""
     print(f"\nGrowth with the mesh (quadratic elements)                    {'set-up s':>10} {'one solve s':>12}")
@@ -105,6 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     fm.inflate(scene(16, stability=BOTH), volumes=[0.5, 1.0])  # imports and first-call costs are not counted
     run_table(repeat)
     errors = trace_table(repeat)
+    effects_table(repeat)
     growth_table((100, 1_000) if quick else (1_000, 10_000, 100_000), repeat if quick else 1)
     assert errors[32, 2] < 1e-6, errors
     assert errors[8, 6] < 1e-9, errors

@@ -295,9 +295,7 @@ def draw_branch(
 
 def _words(branch: Branch, controls: Sequence[str]) -> list[dict[Any, str]]:
     """The verdicts of each equilibrium under the controls asked for."""
-    words: list[dict[Any, str]] = [
-        {c: _ILL_POSED if e.status.ill_posed else e.verdict(c).word for c in controls} for e in branch
-    ]
+    words: list[dict[Any, str]] = [{c: _ILL_POSED if e.status.ill_posed else e.verdict(c).word for c in controls} for e in branch]
     if branch.status.ill_posed:  # a cross marks that one
         words[-1] = words[max(len(words) - 2, 0)]
     return words

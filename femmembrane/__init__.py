@@ -9,6 +9,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .accuracy.error_estimate import Deviation as Deviation
+    from .accuracy.error_estimate import ErrorEstimate as ErrorEstimate
     from .discretization.meridian import Disc as Disc
     from .discretization.meridian import disc as disc
     from .errors import FemmembraneError as FemmembraneError
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _ROOMS = {
+    "accuracy.error_estimate": ("Deviation", "ErrorEstimate"),
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.magnetics": ("Dipole",),

@@ -181,6 +181,8 @@ class Analysis:
         Circumferential wave numbers n >= 1 for which the verdict is given.
     wrinkling : {"total", "mechanical"}, optional
         The principal stresses whose signs divide the membrane into taut and wrinkled zones; left out: no zones are looked for.
+    error_estimates : bool
+        Whether discretisation errors are estimated, by solving again in a finer space.
 
     Raises
     ------
@@ -191,6 +193,7 @@ class Analysis:
     stability: tuple[str, ...] = ()
     azimuthal_modes: tuple[int, ...] = ()
     wrinkling: str | None = None
+    error_estimates: bool = False
 
     def __post_init__(self) -> None:
         stability = _sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure" and "volume"')
@@ -202,7 +205,8 @@ class Analysis:
         _unique("analysis.azimuthal_modes", modes)
         if self.wrinkling is not None:
             _choice("analysis.wrinkling", self.wrinkling, WRINKLING)
-        _convert(self, stability=stability, azimuthal_modes=modes)
+        estimates = _switch("analysis.error_estimates", self.error_estimates)
+        _convert(self, stability=stability, azimuthal_modes=modes, error_estimates=estimates)
 
 
 @dataclass(frozen=True)
@@ -318,7 +322,7 @@ class Scene:
             "source": [_describe("source", "kind", SOURCES, source) for source in self.sources],
             "mesh": {**_describe("mesh", "shape", SHAPES, self.mesh), **{name: getattr(self, name) for name in SCENE_KEYS["mesh"]}},
             "run": _arguments(self.run) if self.run else {},
-            "analysis": _arguments(self.analysis),
+            "analysis": {name: value for name, value in _arguments(self.analysis).items() if value is not False},
             "scales": _arguments(self.scales) if self.scales else {},
         }
         tables["effects"] = {name: True for name, on in tables["effects"].items() if on}

@@ -135,6 +135,7 @@ analyses = st.builds(
     stability=st.lists(st.sampled_from(["pressure", "volume"]), unique=True),
     azimuthal_modes=st.lists(st.integers(1, 20), unique=True, max_size=3),
     wrinkling=st.sampled_from([None, "total", "mechanical"]),
+    error_estimates=st.booleans(),
 )
 orientations = st.sampled_from([1, -1])
 dipoles = st.builds(Dipole, strength=positive | st.integers(0, 600), height=heights, orientation=orientations)
@@ -201,6 +202,8 @@ REFUSED = [
     (plain(run={**VOLUME, "stepps": 4}), "run.stepps", "did you mean 'steps'"),
     (plain(analysis={"wrinkle": "total"}), "analysis.wrinkle", "did you mean 'wrinkling'"),
     (plain(analysis={"wrinkling": "totl"}), "analysis.wrinkling", "did you mean 'total'"),
+    (plain(analysis={"error_estimate": True}), "analysis.error_estimate", "did you mean 'error_estimates'"),
+    (plain(analysis={"error_estimates": 1}), "analysis.error_estimates", "true or false"),
     (plain(mesh=4), "mesh", "a table"),
     ({"material": "ogden"}, "material", "a table"),
     # material

@@ -15,6 +15,7 @@ from ..errors import InputError, Status, unknown_name
 from ..threads import one_thread
 
 if TYPE_CHECKING:
+    from ..accuracy.error_estimate import ErrorEstimate
     from ..potential import Potential
     from ..scene import Scene
     from ..solve.controls import Gas
@@ -70,6 +71,7 @@ class Equilibrium:
     gas: Gas | None = field(default=None, repr=False)
     _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
     _zones: dict[str, Zones] = field(default_factory=dict, repr=False)
+    _errors: dict[str, ErrorEstimate] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
@@ -193,6 +195,30 @@ class Equilibrium:
             self._zones[criterion] = zones.find_zones(self.scene, self.state, self.pressure, criterion)
         return self._zones[criterion]
 
+    @one_thread
+    def error_estimate(self, control: str = "volume") -> ErrorEstimate:
+        """Estimated discretisation errors, from the same load in a finer space; computed once and remembered.
+
+        Where there is none (a compressed or slack state, one too close to a fold of what is held, a mesh too coarse) errors are NaN, and
+        the record says why. In a wrinkled tension field the estimate is rough, a factor of two or so.
+
+        Parameters
+        ----------
+        control : {"volume", "pressure", "height"}
+            What is held: the errors are those of the other quantities at the same volume, pressure or pole height.
+
+        Raises
+        ------
+        InputError
+            For an unknown control.
+        """
+        from ..accuracy.error_estimate import estimate_errors
+
+        if not isinstance(control, str) or control not in self._errors:
+            verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
+            self._errors[control] = estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
+        return self._errors[control]
+
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
@@ -311,7 +337,8 @@ class Branch(Sequence[Equilibrium]):
         ----------
         name : str
             step, an attribute of :class:`Equilibrium`, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind of
-            zones, or, when the scene has scales, pressure_pa.
+            zones, when the scene has scales, pressure_pa, and when it asks for error estimates, error_ with what they are of (relative
+            errors at the load that its [run] prescribes, else at the volume).
 
         Raises
         ------
@@ -319,6 +346,7 @@ class Branch(Sequence[Equilibrium]):
             For an unknown name.
         """
         from ..stability.zones import KINDS
+        from .table import estimated
 
         if name == "step":
             return np.arange(len(self))
@@ -328,12 +356,16 @@ class Branch(Sequence[Equilibrium]):
             return np.array([v.smallest_eigenvalue if kind == "lambda" else v.word for v in verdicts])
         if kind == "fraction" and what in KINDS:
             return np.array([eq.zones().fraction(what) for eq in self], dtype=np.float64)
+        held, errors = estimated(self.scene)
+        if kind == "error" and what in errors:
+            return np.array([getattr(eq.error_estimate(held), what).relative for eq in self], dtype=np.float64)
         scales = self.scene.scales
         if name == "pressure_pa" and scales is not None:
             return scales.to_si("pressure", self.column("pressure"))
         known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
         if name not in known:
             more = [*(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN), *(f"fraction_{k}" for k in KINDS)]
+            more += [f"error_{e}" for e in errors]
             raise unknown_name("column", name, ("step", *known, *more, *(["pressure_pa"] if scales else [])))
         return np.array([getattr(eq, name) for eq in self])
 

@@ -26,6 +26,7 @@ from ..errors import InputError, Status
 if TYPE_CHECKING:
     import xarray
 
+    from ..accuracy.error_estimate import ErrorEstimate
     from ..scene import Scene
     from ..stability.verdict import Verdict
     from .records import Branch, Equilibrium, Jump, SpecialPoint, TraceMemory
@@ -71,6 +72,15 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "fraction_radial": ("part of the reference area with radial wrinkles (only s22 < 0)", "1"),
     "fraction_circumferential": ("part of the reference area with circumferential wrinkles (only s11 < 0)", "1"),
     "fraction_double": ("part of the reference area with wrinkles both ways (s11 < 0 and s22 < 0)", "1"),
+    "error_pressure": ("estimated error of the pressure, relative", "1"),
+    "error_volume": ("estimated error of the volume, relative", "1"),
+    "error_energy": ("estimated error of elastic plus magnetic energy, over the sum of their sizes", "1"),
+    "estimated": ("quantity whose error is estimated", "1"),
+    "error_value": ("quantity at the equilibrium whose error is estimated", "1"),
+    "error_estimate": ("its estimated error, signed", "1"),
+    "error_control": ("what is held while the error is estimated", "1"),
+    "error_method": ("how the error is estimated", "1"),
+    "error_reason": ("why there is no estimate of the error", "1"),
     "zone_step": ("number of the equilibrium that the zone belongs to", "1"),
     "zone_kind": ("kind of the zone", "1"),
     "zone_r_start": ("reference radius over R0 at which the zone starts", "1"),
@@ -131,6 +141,8 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
         variables |= _verdict_variables(tag, [e.verdict(control, azimuthal=azimuthal) for e in branch])
     if branch.scene.analysis.wrinkling:
         variables |= _zone_variables(branch)
+    if branch.scene.analysis.error_estimates:
+        variables |= _estimate_variables(branch)
     if branch.special_points is not None:
         variables |= _special_variables(branch.special_points, width, _SPECIAL)
     if branch.jumps:
@@ -143,7 +155,7 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
         variables["trace_point"] = ("trace", "unknown"), branch.memory.points
         variables["trace_slope"] = ("trace", "unknown"), branch.memory.slopes
     described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
-    coordinates = {name: described.pop(name) for name in ("step", "r") if name in described}
+    coordinates = {name: described.pop(name) for name in ("step", "r", "estimated") if name in described}
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
 
 
@@ -263,6 +275,25 @@ def _zone_variables(branch: Branch) -> dict[str, _Variable]:
     return {f"zone_{name}": (("zone",), _array(name, column)) for name, column in zip(ZONE_COLUMNS, columns, strict=True)}
 
 
+def _estimate_variables(branch: Branch) -> dict[str, _Variable]:
+    """All of the error estimates, which :func:`_estimates` needs to build them again."""
+    from ..accuracy.error_estimate import QUANTITIES
+    from .table import estimated
+
+    found = [eq.error_estimate(estimated(branch.scene)[0]) for eq in branch]
+    parts = {"error_value": "value", "error_estimate": "error"}
+    words = {"error_control": "control", "error_method": "method", "error_reason": "reason"}
+    numbers = {
+        variable: np.array([[getattr(getattr(e, q), part) for q in QUANTITIES] for e in found]).reshape(len(found), len(QUANTITIES))
+        for variable, part in parts.items()
+    }
+    return {
+        "estimated": (("estimated",), np.array(QUANTITIES, dtype=str)),
+        **{variable: (("step", "estimated"), values) for variable, values in numbers.items()},
+        **{variable: (("step",), np.array([getattr(e, word) for e in found], dtype=str)) for variable, word in words.items()},
+    }
+
+
 def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, _Variable]:
     dimension = prefix + "point"
     numbers = {prefix + name: ((dimension,), _array(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
@@ -338,6 +369,8 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
     for tag, control, azimuthal in _asked(scene):
         for equilibrium, verdict in zip(equilibria, _verdicts(dataset, tag, control, azimuthal), strict=True):
             equilibrium._verdicts[control, azimuthal] = verdict
+    for equilibrium, estimate in zip(equilibria, _estimates(dataset), strict=False):
+        equilibrium._errors[estimate.control] = estimate
     return Branch(
         scene=scene,
         equilibria=equilibria,
@@ -423,6 +456,18 @@ def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal:
             coefficients=coefficients if known else None,
             _shape=partial(_stored_shape, mode) if known else None,
         )
+
+
+def _estimates(dataset: xarray.Dataset) -> Iterator[ErrorEstimate]:
+    from ..accuracy.error_estimate import from_numbers
+
+    if "error_estimate" not in dataset:
+        return
+    names = [str(name) for name in dataset["estimated"].values]
+    for k in range(dataset.sizes["step"]):
+        values, errors = (dict(zip(names, dataset[v].values[k].tolist(), strict=True)) for v in ("error_value", "error_estimate"))
+        control, method, reason = (str(dataset[f"error_{word}"].values[k]) for word in ("control", "method", "reason"))
+        yield from_numbers(control, values, errors, method, reason)
 
 
 def _stored_shape(mode: Mapping[str, Array], _: Array) -> Mapping[str, Array]:

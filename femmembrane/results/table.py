@@ -14,6 +14,7 @@ from .store import replace_file
 if TYPE_CHECKING:
     import pandas
 
+    from ..scene import Scene
     from .records import Branch, Equilibrium
 
 #: the order in which verdicts of the two controls are listed
@@ -27,7 +28,7 @@ def columns(branch: Branch) -> list[str]:
 
     ``lambda_`` and ``verdict_`` exist for the controls in ``scene.analysis.stability``, ``lambda_n`` for the modes in
     ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources, ``pressure_pa`` when it has scales, ``fraction_`` of
-    the area for each kind of zone if it asks for ``wrinkling``.
+    the area for each kind of zone if it asks for ``wrinkling``, ``error_`` (relative, estimated) if it asks for ``error_estimates``.
     """
     scene = branch.scene
     controls = [c for c in CONTROLS if c in scene.analysis.stability]
@@ -39,12 +40,24 @@ def columns(branch: Branch) -> list[str]:
         *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),
         *(["pressure_pa"] if scene.scales else []),
         *((f"fraction_{kind}" for kind in KINDS) if scene.analysis.wrinkling else ()),
+        *(f"error_{name}" for name in estimated(scene)[1]),
         *("residual", "iterations", "seconds"),
     ]
 
 
-def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str:
-    """One cell: what a column says about the equilibrium at a step."""
+def estimated(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    """What is held while errors are estimated, and the quantities whose relative errors are columns; none unless asked for.
+
+    Held is what the scene's [run] prescribes; the volume with arc length and without a run.
+    """
+    run = scene.run
+    control = run.control if run is not None and run.control in ("pressure", "height") else "volume"
+    free = {"volume": ("pressure",), "pressure": ("volume",), "height": ("pressure", "volume")}[control]
+    return control, (*free, "energy") if scene.analysis.error_estimates else ()
+
+
+def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume") -> float | int | str:
+    """One cell: what a column says about the equilibrium at a step; ``held`` while its errors are estimated."""
     if column == "step":
         return step
     kind, _, name = column.partition("_")
@@ -56,6 +69,8 @@ def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str
     scales = equilibrium.scene.scales
     if column == "pressure_pa" and scales is not None:
         return scales.to_si("pressure", equilibrium.pressure)
+    if kind == "error":
+        return float(getattr(equilibrium.error_estimate(held), name).relative)
     if kind == "fraction":
         return equilibrium.zones().fraction(name)
     if column == "iterations":
@@ -65,9 +80,9 @@ def value(equilibrium: Equilibrium, step: int, column: str) -> float | int | str
 
 def rows(branch: Branch) -> Iterator[list[float | int | str]]:
     """The rows of the table, in the order of :func:`columns`."""
-    names = columns(branch)
+    names, (held, _) = columns(branch), estimated(branch.scene)
     for step, equilibrium in enumerate(branch):
-        yield [value(equilibrium, step, name) for name in names]
+        yield [value(equilibrium, step, name, held) for name in names]
 
 
 def write_csv(branch: Branch, path: str | PathLike[str]) -> None:

@@ -32,7 +32,7 @@ from ..discretization.meridian import disc
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..potential import Array, Potential, potential_of
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
-from ..solve.newton import correct
+from ..solve.finer import solved_in
 from ..threads import one_thread
 from .azimuthal import LocalResponse, local_response
 
@@ -142,13 +142,10 @@ def _smooth(equilibrium: Equilibrium) -> tuple[Potential, Array, float]:
     if scene.degree >= 6:
         return old, equilibrium.state, equilibrium.pressure
     potential = potential_of(scene.replace(mesh=disc(_SMOOTH_ELEMENTS), degree=_SMOOTH_DEGREE))
-    points = potential.space.interpolation_points()
-    u, _, w, _ = (field.reshape(points.shape) for field in old.space.evaluate(equilibrium.state, points.ravel()))
-    guess = potential.space.interpolate(u, w)
     volume, pressure, height = equilibrium.volume, equilibrium.pressure, equilibrium.center_height
     # at a fold in one quantity another one still tells neighbouring equilibria apart
     for control in (CenterHeightControl(height), VolumeControl(volume), PressureControl(pressure)):
-        result = correct(potential, control, guess, pressure)
+        result = solved_in(potential, control, old, equilibrium.state, pressure)
         if result.status is Status.CONVERGED:
             return potential, result.x, result.pressure
     raise SolveError("the state could not be solved again on elements of high degree", status=result.status)

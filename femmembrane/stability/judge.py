@@ -9,10 +9,9 @@ from functools import partial
 import numpy as np
 
 from ..errors import InputError, Status
-from ..potential import Array, Evaluation, Potential, potential_of
-from ..scene import MAX_DEGREE
+from ..potential import Array, Evaluation, Potential
 from ..solve.controls import PressureControl, VolumeControl
-from ..solve.newton import correct
+from ..solve.finer import solved_finer
 from .azimuthal import azimuthal_verdict
 from .spectrum import SpectrumError
 from .verdict import CONTROLS, Verdict, axisymmetric_verdict
@@ -73,14 +72,9 @@ def _verdict(
 
 def _with_discretisation_error(verdict: Verdict, potential: Potential, x: Array, pressure: float, ask: Callable[..., Verdict]) -> Verdict:
     """Solve again on elements of one degree more (or half the size): by how much an eigenvalue near zero moves decides its sign."""
-    scene, space = potential.scene, potential.space
-    finer = potential_of(scene.replace(degree=scene.degree + 1) if scene.degree < MAX_DEGREE else scene.replace(mesh=scene.mesh.refined()))
-    points = finer.space.interpolation_points()
-    u, _, w, _ = space.evaluate(x, points.ravel())
-    start = finer.space.interpolate(u.reshape(points.shape), w.reshape(points.shape))
     # held is what stays regular where this eigenvalue vanishes
     held = PressureControl(pressure) if verdict.control == "volume" else VolumeControl(potential.evaluate(x, pressure).volume)
-    result = correct(finer, held, start, pressure)
+    finer, result = solved_finer(held, potential, x, pressure)
     if result.status is not Status.CONVERGED:
         return verdict
     try:

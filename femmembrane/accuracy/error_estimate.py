@@ -1,0 +1,238 @@
+"""How far the numbers of an equilibrium are from those of the continuum, estimated by solving again in a finer space.
+
+Values converge at order 2 p for elements of degree p, so that those of degree p + 1 are exact beside them: the difference of the two is
+the error, digits of its own included (Bank & Weiser's hierarchical idea, with the nonlinear problem solved whole). Where a tension field
+is wrinkled somewhere this fails: borders of zones lie inside elements, and what they cost falls with the size of the elements alone.
+There the finer space has quartered elements of one degree more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..errors import InputError, Status, unknown_name
+from ..potential import Array, Evaluation, Potential, potential_of
+from ..scene import MAX_DEGREE, Scene
+from ..solve.banded import negative_directions
+from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
+from ..solve.finer import finer_scene, moved, solved_in, solved_past_folds, transferred
+from ..solve.newton import NewtonResult
+from ..solve.state import State
+from ..solve.wellposed import ill_posed
+from ..stability.spectrum import SpectrumError
+from ..stability.verdict import Verdict, axisymmetric_verdict
+
+CONTROLS = ("volume", "pressure", "height")
+#: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
+FAR = 0.2
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A number and the estimate of its error.
+
+    Attributes
+    ----------
+    value : float
+        As computed.
+    error : float
+        Signed: value minus the number of the finer space; 0 for what is held, NaN where there is no estimate.
+    scale : float
+        What the relative error is relative to.
+    """
+
+    value: float
+    error: float
+    scale: float
+
+    @property
+    def absolute(self) -> float:
+        """Size of the error."""
+        return abs(self.error)
+
+    @property
+    def relative(self) -> float:
+        """Size of the error over the scale: that of the value, for the total energy the sum of the sizes of its two parts."""
+        if self.error == 0 or np.isnan(self.error):
+            return self.error + 0.0
+        return abs(self.error) / self.scale if self.scale else np.inf
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Estimated discretisation errors of one equilibrium.
+
+    Attributes
+    ----------
+    control : {"volume", "pressure", "height"}
+        What is held while the space is refined: its own error is 0.
+    pressure, volume, center_height, elastic_energy, magnetic_energy, energy : Deviation
+        ``energy`` is elastic plus magnetic.
+    lambda_pressure, lambda_volume : Deviation
+        Smallest eigenvalues of the second variation under pressure and volume control.
+    method : str
+        What was compared.
+    reason : str
+        Why errors are NaN; empty when there is an estimate of all of them.
+    """
+
+    control: str
+    pressure: Deviation
+    volume: Deviation
+    center_height: Deviation
+    elastic_energy: Deviation
+    magnetic_energy: Deviation
+    energy: Deviation
+    lambda_pressure: Deviation
+    lambda_volume: Deviation
+    method: str
+    reason: str = ""
+
+    def __str__(self) -> str:
+        lines = [f"at the same {self.control}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
+        for name in QUANTITIES:
+            d: Deviation = getattr(self, name)
+            lines.append(f"{name.replace('_', ' '):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
+        return "\n".join(lines + ([self.reason] if self.reason else []))
+
+
+#: what an estimate is about, in its order
+QUANTITIES = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
+
+
+def estimate_errors(potential: Potential, x: Array, pressure: float, control: str, verdicts: Mapping[str, Verdict]) -> ErrorEstimate:
+    """Estimate the discretisation errors of a state.
+
+    Parameters
+    ----------
+    potential : Potential
+    x, pressure : ndarray, shape (n_free,), float
+        The state.
+    control : {"volume", "pressure", "height"}
+        What is held.
+    verdicts : mapping of "pressure" and "volume" to Verdict
+        Those of the state.
+
+    Raises
+    ------
+    InputError
+        For an unknown control.
+    """
+    if not isinstance(control, str):
+        raise InputError("control", control, "a name is allowed")
+    if control not in CONTROLS:
+        raise unknown_name("control", control, CONTROLS)
+    evaluation = potential.evaluate(x, pressure)
+    values = _numbers(potential, x, pressure, evaluation, verdicts)
+    scene, method = _finer(potential, evaluation)
+    bad = ill_posed(potential, evaluation)
+    if bad is not None:
+        return _without(control, values, method, f"not estimated: {bad}, and what a mesh finds depends on the mesh")
+    finer = potential_of(scene)
+    found, reason = _same_state(finer, potential, x, pressure, evaluation, control)
+    if found is None:
+        return _without(control, values, method, reason)
+    better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
+    return _compared(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better), method, reason)
+
+
+def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evaluation, verdicts: Mapping[str, Verdict]) -> dict[str, float]:
+    return {
+        "pressure": float(pressure),
+        "volume": evaluation.volume,
+        "center_height": potential.space.center_height(x),
+        "elastic_energy": evaluation.elastic_energy,
+        "magnetic_energy": evaluation.magnetic_energy,
+        "energy": evaluation.energy,
+        "lambda_pressure": float(verdicts["pressure"].smallest_eigenvalue),
+        "lambda_volume": float(verdicts["volume"].smallest_eigenvalue),
+    }
+
+
+def _finer(potential: Potential, evaluation: Evaluation) -> tuple[Scene, str]:
+    """The scene on finer elements, and in words."""
+    scene = potential.scene
+    better = finer_scene(scene)
+    if scene.tension_field and (evaluation.stress <= 0).any():
+        better = scene.replace(mesh=scene.mesh.refined().refined(), degree=min(scene.degree + 1, MAX_DEGREE))
+        what = f"quartered elements of degree {better.degree}, for borders of wrinkled zones inside elements: rough"
+    else:
+        what = f"elements of degree {better.degree}" if better.degree > scene.degree else f"halved elements of degree {better.degree}"
+    return better, f"hierarchical: against the same load on {what}"
+
+
+def _same_state(
+    finer: Potential, potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str
+) -> tuple[NewtonResult | None, str]:
+    """The equilibrium in the finer space that the state stands for, or None with the reason why there is none."""
+    controls: dict[str, Control] = {
+        "volume": VolumeControl(evaluation.volume),
+        "pressure": PressureControl(pressure),
+        "height": CenterHeightControl(potential.space.center_height(x)),
+    }
+    held = controls[control]
+    start = transferred(potential.space, x, finer.space)
+    side = _side(potential, evaluation, control)
+
+    def judged(result: NewtonResult) -> str:
+        if result.status is not Status.CONVERGED:
+            return f"the finer space has no equilibrium near at this {control}"
+        if _side(finer, result.evaluation, control) != side:
+            return "in the finer space the state lies beyond a fold"
+        if (change := moved(finer, result.x, start)) > FAR:
+            return f"the membrane of the finer space is {change:.0%} off, so the mesh is too coarse for an estimate"
+        bad = ill_posed(finer, result.evaluation)
+        return f"in the finer space {bad}" if bad is not None else ""
+
+    result = solved_in(finer, held, potential, x, pressure)
+    if judged(result):
+        state = State(x, pressure, evaluation, 0, 0.0, 0.0, 0.0)
+        result = solved_past_folds(finer, held, potential, state)
+    reason = judged(result)
+    return (None, f"not estimated: {reason}") if reason else (result, "")
+
+
+def _side(potential: Potential, evaluation: Evaluation, control: str) -> int:
+    """On which side of a fold of the control a state lies: its number of negative directions, which changes there."""
+    if control == "height":
+        return 0
+    constraint = evaluation.volume_gradient if control == "volume" else None
+    return negative_directions(evaluation.band, potential.space.half_bandwidth, constraint)
+
+
+def _verdicts(
+    finer: Potential, evaluation: Evaluation, potential: Potential, verdicts: Mapping[str, Verdict]
+) -> tuple[dict[str, Verdict], str]:
+    """Verdicts in the finer space, started from the modes of the coarser one, and what went wrong."""
+    better, reason = {}, ""
+    for control, verdict in verdicts.items():
+        mode = verdict.coefficients
+        guess = None if mode is None else transferred(potential.space, mode, finer.space)
+        try:
+            better[control] = axisymmetric_verdict(finer, evaluation, control, guess)
+        except SpectrumError as error:  # one eigenvalue that cannot be proved must not cost the rest
+            better[control] = Verdict(None, np.nan, np.nan, control, 0, None, str(error))
+        if not np.isfinite([verdict.smallest_eigenvalue, better[control].smallest_eigenvalue]).all():
+            reason = f"no error of the eigenvalue under {control} control: it could not be proved to be the smallest"
+    return better, reason
+
+
+def _compared(control: str, values: Mapping[str, float], better: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
+    held = {"height": "center_height"}.get(control, control)
+    errors = {name: 0.0 if name == held else value - better[name] for name, value in values.items()}
+    return from_numbers(control, values, errors, method, reason)
+
+
+def _without(control: str, values: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
+    return from_numbers(control, values, dict.fromkeys(values, np.nan), method, reason)
+
+
+def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
+    """The record of values and errors by name."""
+    scales = {name: abs(value) for name, value in values.items()}
+    scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
+    parts = {name: Deviation(values[name], errors[name], scales[name]) for name in QUANTITIES}
+    return ErrorEstimate(control, **parts, method=method, reason=reason)

@@ -139,7 +139,8 @@ def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Stat
     """The branch of what was found before the computation ended early; special points are not searched for."""
     from .results.records import Branch
 
-    return Branch(scene=scene, equilibria=tuple(equilibria), status=status, message=message)
+    used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
+    return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message)
 
 
 def _write(branch: Branch, out: Path, scene: Path) -> list[Path]:

@@ -25,6 +25,7 @@ class Status(StrEnum):
     SLACK = "slack"
     STEP_LIMIT = "step limit"
     UNEXPLAINED_INERTIA = "unexplained change of inertia"
+    ACCURACY_NOT_MET = "accuracy not met"
     INTERRUPTED = "interrupted"
 
     @property
@@ -46,6 +47,7 @@ _ADVICE = {
     Status.NOT_A_MINIMUM: 'forces balance there, but a minimiser cannot hold it; solver="newton" accepts such states',
     Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",
     Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",
+    Status.ACCURACY_NOT_MET: "ask for less (mesh.accuracy), or give mesh.elements and mesh.degree",
     Status.INTERRUPTED: "what was computed is kept; continue from there",
     Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh; "
     "a tension field (effects.tension_field = true) wrinkles instead",

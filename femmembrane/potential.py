@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .discretization.space import HESSIAN_PAIRS, Space, space_of
+from .errors import InputError
 from .physics.kinematics import hencky_strains
 from .physics.loads import volume_density
 from .physics.magnetics import Source, magnetic_energy_density
@@ -320,7 +321,17 @@ def vectorise(function: ca.Function, n: int) -> ca.Function:
 
 
 def potential_of(scene: Scene) -> Potential:
-    """The potential of a scene, built once: scenes that differ only in what is done with it share one."""
+    """The potential of a scene, built once: scenes that differ only in what is done with it share one.
+
+    Raises
+    ------
+    InputError
+        While the mesh of the scene is still to be chosen.
+    """
+    if scene.open:
+        accuracy = getattr(scene.mesh, "accuracy", None)
+        chosen = "no mesh is chosen for it here; give elements and degree, or the scene of a branch from inflate, pressurize, trace or run"
+        raise InputError("mesh.accuracy", accuracy, chosen)
     return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
 
 

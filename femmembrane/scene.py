@@ -57,6 +57,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
 _OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
 
 MAX_DEGREE = 8
+_DEGREE = 2
 _RADIUS_TO_THICKNESS = 1000.0
 _MAX_STEPS = 400
 
@@ -220,7 +221,7 @@ class Scene:
     mesh : Meridian
         Reference meridian and its elements.
     degree : int
-        Polynomial degree of the elements, 1 to 8.
+        Polynomial degree of the elements, 1 to 8; left out: 2, or as chosen with a mesh for an accuracy (None until then).
     sources : sequence of Source
         Magnetic sources on the axis; none: nothing magnetic is built.
     susceptibility : float, optional
@@ -245,7 +246,7 @@ class Scene:
 
     material: Material
     mesh: Meridian = field(default_factory=disc)
-    degree: int = 2
+    degree: int = None  # type: ignore[assignment]  # an int as soon as the scene has elements
     sources: tuple[Source, ...] = ()
     susceptibility: float | None = None
     radius_to_thickness: float = None  # type: ignore[assignment]  # a float as soon as the scene is made
@@ -265,7 +266,7 @@ class Scene:
         _require("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
         _convert(
             self,
-            degree=_whole("mesh.degree", self.degree, most=MAX_DEGREE),
+            degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
             susceptibility=_optional(_susceptibility, "membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
@@ -297,14 +298,24 @@ class Scene:
                 "dipole this strength (in a scene file: leave the strength of the dipole out)",
             )
 
+    @property
+    def open(self) -> bool:
+        """Whether the elements are still to be chosen, for the accuracy that is asked for: nothing can be computed before."""
+        return bool(getattr(self.mesh, "open", False))
+
     def replace(self, **changes: Any) -> Self:
-        """The same scene with some attributes changed, checked anew; with new scales, ``radius_to_thickness`` follows them."""
+        """The same scene with some attributes changed, checked anew.
+
+        With new scales ``radius_to_thickness`` follows them; a mesh that is still to be chosen drops the degree.
+        """
         known = [f.name for f in fields(self)]
         for name, value in changes.items():
             if name not in known:
                 raise InputError(name, value, unknown_name(name, name, known).allowed)
         if changes.get("scales") is not None:
             changes.setdefault("radius_to_thickness", None)
+        if getattr(changes.get("mesh"), "open", False):
+            changes.setdefault("degree", None)
         return dataclasses.replace(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:
@@ -526,6 +537,12 @@ def _whole(key: str, value: Any, *, most: int | None = None) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1 or (most is not None and value > most):
         raise InputError(key, value, "a whole number >= 1 is allowed" if most is None else f"a whole number from 1 to {most} is allowed")
     return int(value)
+
+
+def _degree(key: str, value: Any, mesh_open: bool) -> int | None:
+    if mesh_open and value is not None:
+        raise InputError(key, value, "not allowed together with mesh.accuracy, for which the degree is chosen; leave one out")
+    return None if mesh_open else _DEGREE if value is None else _whole(key, value, most=MAX_DEGREE)
 
 
 def _ratio(key: str, value: Any, scales: Scales | None) -> float:

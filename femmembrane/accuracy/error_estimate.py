@@ -127,12 +127,12 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
         raise unknown_name("control", control, CONTROLS)
     evaluation = potential.evaluate(x, pressure)
     values = _numbers(potential, x, pressure, evaluation, verdicts)
-    scene, method = _finer(potential, evaluation)
+    scene, method = finer_space(potential, evaluation)
     bad = ill_posed(potential, evaluation)
     if bad is not None:
         return _without(control, values, method, f"not estimated: {bad}, and what a mesh finds depends on the mesh")
     finer = potential_of(scene)
-    found, reason = _same_state(finer, potential, x, pressure, evaluation, control)
+    found, reason = same_state(finer, potential, x, pressure, evaluation, control)
     if found is None:
         return _without(control, values, method, reason)
     better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
@@ -152,7 +152,7 @@ def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evalua
     }
 
 
-def _finer(potential: Potential, evaluation: Evaluation) -> tuple[Scene, str]:
+def finer_space(potential: Potential, evaluation: Evaluation) -> tuple[Scene, str]:
     """The scene on finer elements, and in words."""
     scene = potential.scene
     better = finer_scene(scene)
@@ -164,7 +164,7 @@ def _finer(potential: Potential, evaluation: Evaluation) -> tuple[Scene, str]:
     return better, f"hierarchical: against the same load on {what}"
 
 
-def _same_state(
+def same_state(
     finer: Potential, potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str
 ) -> tuple[NewtonResult | None, str]:
     """The equilibrium in the finer space that the state stands for, or None with the reason why there is none."""

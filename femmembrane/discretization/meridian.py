@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: number of elements unless something else is said
 ELEMENTS = 64
+#: relative accuracies that a mesh may be chosen for: round-off ends what is below
+LEAST_ACCURACY, MOST_ACCURACY = 0.1, 1e-12
 #: ratios of sizes reach from one over this to this: beyond, the smallest elements drown in round-off
 MAX_RATIO = 1e6
 
@@ -71,18 +73,28 @@ class Disc:
         Size of the element at the rim over that of the element at the pole, 1e-6 to 1e6; sizes follow a geometric progression.
     radii : sequence of float, optional
         Ends of the elements, over R0, strictly increasing from 0 to 1: any other grading, in place of ``elements`` and ``ratio``.
+    accuracy : float, optional
+        In place of all of these, 1e-12 to 0.1: the relative accuracy for which elements and degree are to be chosen. Until then the mesh is
+        open, has no elements, and nothing can be computed on it.
+    estimated : float, optional
+        The relative error estimated when it was chosen; belongs to a mesh with ``accuracy`` and ``radii``, which keeps both.
 
     Raises
     ------
     InputError
-        For a value outside these sets, and for radii that contradict ``elements`` or come with a ratio.
+        For a value outside these sets, and for those that contradict each other.
     """
 
     elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
     ratio: float = 1.0
     radii: tuple[float, ...] | None = None
+    accuracy: float | None = None
+    estimated: float | None = None
 
     def __post_init__(self) -> None:
+        _check_accuracy(self)
+        if self.open:
+            return
         ratio = _ratio(self.ratio)
         radii = None if self.radii is None else _radii(self.radii)
         follows = ELEMENTS if radii is None else len(radii) - 1
@@ -100,7 +112,14 @@ class Disc:
     def shape(self) -> str:
         return "disc"
 
+    @property
+    def open(self) -> bool:
+        """Whether the elements are still to be chosen."""
+        return self.accuracy is not None and self.estimated is None
+
     def breakpoints(self) -> Array:
+        if self.open:
+            return np.array([0.0, 1.0])
         if self.radii is not None:
             return np.array(self.radii)
         if self.ratio == 1 or self.elements == 1:
@@ -127,9 +146,39 @@ class Disc:
         return frozenset({"u"}), frozenset({"u", "w"})
 
 
-def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float] | None = None) -> Disc:
-    """Mesh of the flat, clamped disc: ``elements`` along the radius, graded by ``ratio`` or ending at ``radii``; see :class:`Disc`."""
-    return Disc(elements=elements, ratio=ratio, radii=radii)  # type: ignore[arg-type]  # checked there
+def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float] | None = None, accuracy: float | None = None) -> Disc:
+    """Mesh of the flat, clamped disc: ``elements`` along the radius, graded by ``ratio`` or ending at ``radii``, or to be chosen for an
+    ``accuracy``; see :class:`Disc`."""
+    return Disc(elements=elements, ratio=ratio, radii=radii, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
+
+
+def _check_accuracy(mesh: Disc) -> None:
+    """Raise InputError unless a mesh is given, open, or chosen for an accuracy."""
+    if mesh.accuracy is None:
+        if mesh.estimated is not None:
+            raise InputError("mesh.estimated", mesh.estimated, "it belongs to a mesh that was chosen for mesh.accuracy; leave it out")
+        return
+    _positive("mesh.accuracy", mesh.accuracy, MOST_ACCURACY, LEAST_ACCURACY, " (relative error of the pressure and the energy)")
+    if mesh.estimated is not None:
+        _positive("mesh.estimated", mesh.estimated, 0.0, math.inf, "")
+    if (mesh.estimated is None) != (mesh.radii is None):
+        key = "radii" if mesh.estimated is None else "estimated"
+        raise InputError(
+            f"mesh.{key}", getattr(mesh, key), "not allowed together with mesh.accuracy, for which the mesh is chosen; leave one out"
+        )
+    if mesh.open and (mesh.elements is not None or mesh.ratio != 1):
+        key = "ratio" if mesh.elements is None else "elements"
+        raise InputError(
+            f"mesh.{key}", getattr(mesh, key), "not allowed together with mesh.accuracy, for which the mesh is chosen; leave one out"
+        )
+    for name in ("accuracy", "estimated"):
+        if getattr(mesh, name) is not None:
+            object.__setattr__(mesh, name, float(getattr(mesh, name)))
+
+
+def _positive(key: str, value: Any, least: float, most: float, what: str) -> None:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not least <= float(value) <= most:
+        raise InputError(key, value, f"a number from {least:g} to {most:g} is allowed{what}")
 
 
 def _ratio(value: Any) -> float:

@@ -8,7 +8,7 @@ problem is banded with half bandwidth 2 degree + 1. Points are numbered quadratu
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -183,10 +183,16 @@ class Space:
 
     def interpolate(self, u: Array, w: Array) -> Array:
         """Free coefficients of the interpolant of displacements given at :meth:`interpolation_points`, both of that shape."""
-        inverse = np.linalg.inv(self.shape_functions(_lobatto(self.degree))[0])
+        inverse = self._from_values
         x = np.zeros(self.n_free + 1)
         x[self.gather] = np.concatenate([inverse @ u, inverse @ w])
         return x[: self.n_free]
+
+    @cached_property
+    def _from_values(self) -> Array:
+        """Local coefficients from values at the interpolation points of an element."""
+        values = self.shape_functions(_lobatto(self.degree))[0]
+        return np.linalg.inv(values).astype(np.float64, copy=False)
 
     def interpolation_points(self) -> Array:
         """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""

@@ -104,6 +104,7 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
     return {
         "scene": branch.scene.to_dict(),
         "command": command if command is None or isinstance(command, str) else list(command),
+        **({"mesh": branch.mesh_used} if branch.mesh_used else {}),
         "status": branch.status.value,
         "message": branch.message,
         "equilibria": len(branch),

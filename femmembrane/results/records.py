@@ -379,9 +379,17 @@ class Branch(Sequence[Equilibrium]):
             numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
             words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
             lines.append(numbers + words + (f"  {eq.zones().summary}" if zones else ""))
-        if self.message:
-            lines.append(self.message)
+        lines += [line for line in (self.mesh_used, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)
+
+    @property
+    def mesh_used(self) -> str:
+        """The mesh that was chosen for an accuracy, in words; empty for one that was given."""
+        mesh, degree = self.scene.mesh, self.scene.degree
+        accuracy, estimated = (getattr(mesh, name, None) for name in ("accuracy", "estimated"))
+        if accuracy is None or estimated is None:
+            return ""
+        return f"mesh: {mesh.elements} elements of degree {degree}, graded, chosen for accuracy {accuracy:g}, estimated {estimated:.0e}"
 
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""

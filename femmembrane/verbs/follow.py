@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..accuracy.adapt import spread
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, Jump, SpecialPoint
@@ -22,6 +23,7 @@ from ..solve.start import START_VOLUME, flat_state, start_at_height, start_at_pr
 from ..solve.state import Path, State
 from ..solve.stepping import Corrector, march
 from ..threads import one_thread
+from .meshing import on_chosen_mesh
 from .recording import OnStep, record, resume
 from .trace import trace
 
@@ -174,9 +176,18 @@ def _follow(
         raise unknown_name("solver", solver, _SOLVERS)
     if at_limit not in AT_LIMIT:
         raise unknown_name("at_limit", str(at_limit), AT_LIMIT)
-    clock = time.perf_counter()
-    potential = potential_of(scene)
-    timings = {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
+
+    def trial(on_mesh: Scene, begin: Equilibrium | None) -> Branch:
+        return _follow(on_mesh, control, loads[spread(loads)], begin, solver, False, None, at_limit)
+
+    try:
+        scene, start, timings = on_chosen_mesh(scene, start, trial, control)
+    except SolveError as error:
+        if throw:
+            raise
+        return Branch(scene, (), error.status, str(error))
+    clock, potential = time.perf_counter(), potential_of(scene)
+    timings |= {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
     status, message = Status.CONVERGED, ""
@@ -289,6 +300,7 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
     clock = time.perf_counter()
     if not isinstance(gas, Gas):
         raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
+    scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
     state = start_at_volume(potential, START_VOLUME) if start is None else resume(potential, start)
     # the amount that holds the state at hand is known: march from it to the wanted one

@@ -20,6 +20,7 @@ from ..solve.state import Path
 from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps
+from .meshing import on_chosen_mesh
 from .recording import OnStep, record, resume
 
 #: distance to a source at which the membrane counts as touching it
@@ -74,15 +75,49 @@ def trace(
     Raises
     ------
     InputError, SolveError
-        The latter when the start cannot be reached, and for ``throw``: then it carries the branch as ``result``.
+        The latter when the start cannot be reached or no mesh meets the accuracy that the scene asks for, and for ``throw``: then it
+        carries the branch as ``result``.
     """
     targets = _targets(until)
+    scene, start, timings = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
     tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)
+    tracing.timings |= timings
     status, message = tracing.follow(targets, ill_posed)
     branch = tracing.branch(status, message)
     if throw and message and (until is not None or status is not Status.STEP_LIMIT):
         raise SolveError(message, status=status, result=branch)
     return branch
+
+
+def _on_mesh(
+    scene: Scene,
+    start: float | Equilibrium | Branch,
+    until: Mapping[str, float] | None,
+    direction: int,
+    max_steps: int,
+    steps: StepControl | None,
+    ill_posed: str,
+) -> tuple[Scene, float | Equilibrium | Branch, dict[str, float]]:
+    """The scene with a mesh, the start on it and the seconds that took; a branch that is continued keeps the mesh chosen for it."""
+    if isinstance(start, Branch) and scene.open and getattr(start.scene.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
+        return scene.replace(mesh=start.scene.mesh, degree=start.scene.degree), start, {}
+
+    def follow(trial: Scene, begin: Equilibrium | None) -> Branch:
+        first = start if begin is None else begin
+        return trace(
+            trial,
+            start=first,
+            until=until,
+            direction=direction,
+            max_steps=max_steps,
+            steps=steps,
+            special_points=False,
+            ill_posed=ill_posed,
+        )
+
+    begin = start if isinstance(start, Equilibrium) else None
+    chosen, begin, timings = on_chosen_mesh(scene, begin, follow, "arc-length")
+    return chosen, start if begin is None else begin, timings
 
 
 def trace_iter(

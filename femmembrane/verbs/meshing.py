@@ -1,0 +1,42 @@
+"""The mesh of a scene that names an accuracy instead: chosen before anything is computed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..potential import potential_of
+from ..results.records import Branch, Equilibrium
+from ..scene import Scene
+from ..solve.finer import transferred
+
+#: what is wanted, or a part of it, from a scene with a mesh and a start on it
+FollowFrom = Callable[[Scene, Equilibrium | None], Branch]
+
+
+def on_chosen_mesh(
+    scene: Scene, start: Equilibrium | None, follow: FollowFrom, control: str
+) -> tuple[Scene, Equilibrium | None, dict[str, float]]:
+    """The scene with a mesh, the start on that mesh, and the seconds that the choice took; all as it is unless it is still to be chosen.
+
+    Raises
+    ------
+    SolveError
+        When no mesh meets the accuracy, or the run yields nothing on a trial mesh.
+    """
+    if not scene.open:
+        return scene, start, {}
+    clock = time.perf_counter()
+    from ..accuracy.adapt import choose_mesh
+
+    chosen = choose_mesh(scene, lambda trial: follow(trial, _carried(start, trial)), control)
+    return chosen, _carried(start, chosen), {"mesh": time.perf_counter() - clock}
+
+
+def _carried(start: Equilibrium | None, scene: Scene) -> Equilibrium | None:
+    """A start on another mesh, as a guess: whoever resumes it solves again."""
+    if not isinstance(start, Equilibrium):
+        return start
+    state = transferred(start.potential.space, start.state, potential_of(scene).space)
+    return replace(start, scene=scene, state=state, _verdicts={}, _zones={}, _errors={})

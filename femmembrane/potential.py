@@ -223,6 +223,7 @@ class Family(Potential):
     """
 
     def __init__(self, scene: Scene, vary: Callable[[Any], Any], quadrature: int | None = None) -> None:
+        _require_elements(scene)
         number = ca.SX.sym("number")
         with _casadi_answers_numpy():
             super().__init__(vary(number), quadrature)
@@ -328,11 +329,15 @@ def potential_of(scene: Scene) -> Potential:
     InputError
         While the mesh of the scene is still to be chosen.
     """
+    _require_elements(scene)
+    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
+
+
+def _require_elements(scene: Scene) -> None:
     if scene.open:
         accuracy = getattr(scene.mesh, "accuracy", None)
-        chosen = "no mesh is chosen for it here; give elements and degree, or the scene of a branch from inflate, pressurize, trace or run"
-        raise InputError("mesh.accuracy", accuracy, chosen)
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
+        advice = "no mesh is chosen for it here; give elements and degree, or the scene of a branch from inflate, pressurize, trace or run"
+        raise InputError("mesh.accuracy", accuracy, advice)
 
 
 @lru_cache(maxsize=64)

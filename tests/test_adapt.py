@@ -195,10 +195,15 @@ def test_states_that_depend_on_the_mesh():
     assert e.value.status is fm.Status.ACCURACY_NOT_MET
 
 
-@pytest.mark.parametrize("verb", [lambda s: fm.equilibria(s, pressure=1.0), lambda s: next(fm.trace_iter(s)), lambda s: s and fm.run(s)])
+def fold_curve(scene):
+    point = fm.trace(disc_scene(OGDEN, (1.0, 6.5), elements=8), start=1.0, until={"volume": 5.0}).special_points[0]
+    return fm.fold_curve(scene, start=point, parameter="membrane.susceptibility", bounds=(1.0, 3.0))
+
+
+@pytest.mark.parametrize("verb", [lambda s: fm.equilibria(s, pressure=1.0), lambda s: next(fm.trace_iter(s)), fold_curve])
 def test_where_no_mesh_is_chosen(verb):
-    with pytest.raises(fm.InputError, match=r"mesh\.accuracy|run"):
-        verb(asking(disc_scene(OGDEN), 1e-6))
+    with pytest.raises(fm.InputError, match=r"mesh\.accuracy = 1e-06: no mesh is chosen for it here"):
+        verb(asking(disc_scene(OGDEN, (1.0, 6.5)), 1e-6))
 
 
 # --- values

@@ -77,6 +77,7 @@ class Space:
         zero = np.zeros_like(value)
         blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
         self.table = np.block(blocks)
+        self._magnitudes = np.abs(self.table)
         rows = self.table.reshape(4, self.n_quadrature, -1)
         outer = []
         for i, j in HESSIAN_PAIRS:
@@ -128,7 +129,7 @@ class Space:
 
     def assemble_magnitude(self, density: Array) -> Array:
         """As :meth:`assemble_vector` for a density >= 0, with no cancellation between shape functions or elements."""
-        return _sum_by(self._gather_flat, np.abs(self.table).T @ density, self.n_free + 1)[: self.n_free]
+        return _sum_by(self._gather_flat, self._magnitudes.T @ density, self.n_free + 1)[: self.n_free]
 
     def assemble_band(self, density: Array) -> Array:
         """Integrate second derivatives, shape (10 n_quadrature, n_elements) in the order of HESSIAN_PAIRS.

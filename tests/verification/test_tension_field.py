@@ -96,6 +96,16 @@ def test_profile_above_a_slack_circle(height, error):
     assert not profile["mechanical_stress_2"][wrinkled].any()
 
 
+@pytest.mark.parametrize(("dipole", "height"), [(ABOVE_ZERO, -0.3), ((400.0, -3.25), -0.4), (STRONG, 0.345)])
+def test_jacobi_counts_the_negative_directions_of_wrinkled_states(dipole, height):
+    """An ordinary differential equation beside the eigenvalues of the relaxed second variation, whose coefficients jump at two radii."""
+    eq = fm.equilibrium(wrinkling(dipole), center_height=height)
+    assert 0.05 < eq.zones("mechanical").fraction("radial") < 0.5
+    test = fm.jacobi_test(eq)
+    assert eq.verdict("pressure").negative_directions == len(test.conjugate_points) == 1
+    assert test.conclusion == eq.verdict("pressure").word == "unstable"
+
+
 #: pole height, radius, volume and pressure at which the tension of the meridian vanishes on a circle: by shooting, bisected between
 #: states whose meridian turns one way round there and the other; recorded on 2026-11-24
 FOLD = {"center_height": 0.321102, "r": 0.730974, "volume": 2 * np.pi * 0.0345056, "pressure": 3.383403}

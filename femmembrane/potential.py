@@ -40,12 +40,13 @@ _BLOCK = 1024
 
 @dataclass(slots=True)
 class Evaluation:
-    """Value, gradient and Hessian of E and V at one state; energies and volume with the 2 pi.
+    """Value, gradient and Hessian of E and V at one state x; energies and volume with the 2 pi.
 
     ``stress`` are the principal mechanical stresses at the quadrature points, shape (2, n_points); ``force_density`` is what was
     integrated to the two gradients, for judging a residual; ``stiffness_density`` is what :attr:`band` integrates.
     """
 
+    x: Array
     elastic_energy: float
     magnetic_energy: float
     volume: float
@@ -144,7 +145,7 @@ class Potential:
             force_density = out[3:11].copy()
             gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
         stiffness_density = out[11:21].reshape(-1, space.n_elements).copy()
-        return Evaluation(e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, space)
+        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, space)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""

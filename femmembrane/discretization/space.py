@@ -215,6 +215,13 @@ class Space:
         u_s, w_s = (np.einsum("qa,aq->q", slope, c) / size for c in (coefficients[:n_local], coefficients[n_local:]))
         return u, u_s, w, w_s
 
+    def at_inner_ends(self, x: Array) -> tuple[Array, Array, Array, Array]:
+        """(u, u_s, w, w_s) where two elements meet, each of shape (n_elements - 1,): slopes, which jump there, as the mean of both."""
+        value, slope = self.shape_functions(np.array([0.0, 1.0]))
+        u, w = np.split(self.extend(x)[self.gather], 2)
+        u_s, w_s = ((lambda both: (both[1, :-1] + both[0, 1:]) / 2)(slope @ c / self.sizes) for c in (u, w))
+        return (value @ u)[0, 1:], u_s, (value @ w)[0, 1:], w_s
+
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.
 

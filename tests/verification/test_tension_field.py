@@ -24,10 +24,10 @@ def wrinkling(dipole: tuple[float, float], elements: int = 64, degree: int = 2, 
 
 
 @cache
-def exact(dipole: tuple[float, float], height: float, relaxed: bool = True) -> Solution:
+def exact(dipole: tuple[float, float], height: float, elements: int = 128) -> Solution:
     """By shooting; the finite elements lend the guess alone."""
-    guess = fm.equilibrium(wrinkling(dipole, 128, relaxed=relaxed), center_height=height)
-    membrane = Membrane(OGDEN.mu, OGDEN.alpha, SUSCEPTIBILITY, *dipole, tension_field=relaxed)
+    guess = fm.equilibrium(wrinkling(dipole, elements), center_height=height)
+    membrane = Membrane(OGDEN.mu, OGDEN.alpha, SUSCEPTIBILITY, *dipole)
     found = solve(membrane, height, float(guess.profile([0.0])["stretch_1"][0]), guess.pressure)
     assert found.miss < 1e-11
     return found
@@ -67,24 +67,27 @@ def test_wrinkled_annulus(height):
     same = fm.equilibrium(relaxed.scene, volume=plain.volume, start=relaxed)
     assert same.energy < plain.energy
     assert plain.profile()["mechanical_stress_2"].min() < -1e-3
-    assert 1e-5 < abs(same.pressure / plain.pressure - 1) < 1e-2
+    # recorded on 2026-11-24: at the same volume the pressure differs by 0.009 to 0.3 per cent
+    assert 5e-5 < abs(same.pressure / plain.pressure - 1) < 3e-3
 
 
-@pytest.mark.parametrize("height", [0.36, 0.345, 0.33])
-def test_convergence_above_a_slack_circle(height):
-    """M = 600, h = -3.25: borders of zones lie inside elements, so the error falls unevenly, on the whole at order 2.5 or more."""
-    expected, errors = exact(STRONG, height), []
-    for elements in (32, 64, 128, 256, 512):
+@pytest.mark.parametrize(("height", "coarsest", "error"), [(0.36, 32, 3e-7), (0.345, 32, 1e-6), (0.33, 256, 1e-5)])
+def test_convergence_above_a_slack_circle(height, coarsest, error):
+    """M = 600, h = -3.25: borders of zones lie inside elements, so the error falls unevenly, on the whole at order 2 or more."""
+    expected, errors = exact(STRONG, height, elements=512), []
+    meshes = [coarsest * 2**k for k in range(10) if coarsest * 2**k <= 1024]
+    for elements in meshes:
         eq = fm.equilibrium(wrinkling(STRONG, elements), center_height=height)
+        assert eq.status is fm.Status.CONVERGED
         errors.append(max(abs(eq.pressure / expected.pressure - 1), abs(eq.volume / expected.volume - 1)))
-    assert errors[-1] < 1e-6 if height > 0.34 else errors[-1] < 1e-5
-    assert np.polyfit(np.log(2.0) * np.arange(5), np.log(errors), 1)[0] < -1.9
+    assert errors[-1] < error
+    assert -np.polyfit(np.log(meshes), np.log(errors), 1)[0] > 1.9
 
 
 @pytest.mark.parametrize(("height", "error"), [(0.36, 2e-6), (0.345, 5e-6), (0.33, 3e-5)])
 def test_profile_above_a_slack_circle(height, error):
     r = np.linspace(0.05, 0.95, 181)
-    expected, eq = exact(STRONG, height), fm.equilibrium(wrinkling(STRONG, 256), center_height=height)
+    expected, eq = exact(STRONG, height, elements=512), fm.equilibrium(wrinkling(STRONG, 256), center_height=height)
     profile = eq.profile(r)
     rho, eta, f, g = expected.at(r)
     np.testing.assert_allclose(profile["rho"], rho, atol=error)
@@ -149,7 +152,32 @@ def test_the_branch_ends_at_the_slack_circle():
         verdict = branch[-1].verdict("volume")
         assert (verdict.stable, np.isnan(verdict.smallest_eigenvalue)) == (False, True)
         assert "tension vanishes" in verdict.reason
-        assert "meridional stress vanishes" in branch[-1].verdict(azimuthal=1).reason
+        assert "tension vanishes" in branch[-1].verdict(azimuthal=1).reason
+
+
+@pytest.mark.parametrize("elements", [8, 16, 32, 64])
+def test_no_load_leads_past_the_slack_circle(elements):
+    """By volume, by pole height, with either solver, with jumps, from a branch that ended there, or by a search for all equilibria."""
+    scene = wrinkling(STRONG, elements)
+    volumes = [0.4, 0.3, 0.24, 0.21, 0.2]
+    for asked in ({}, {"solver": "newton"}, {"at_limit": "jump"}):
+        run = fm.inflate(scene, volumes=volumes, throw=False, **asked)
+        assert run.status is fm.Status.SLACK
+        assert len(run) < 4
+        assert not run.jumps
+        assert "the meridional tension vanishes at r = 0." in run.message
+        assert all(eq.status is fm.Status.CONVERGED for eq in run[:-1])
+    for height in (0.31, 0.2):
+        with pytest.raises(fm.SolveError, match="tension vanishes") as caught:
+            fm.equilibrium(scene, center_height=height)
+        assert caught.value.status is fm.Status.SLACK
+    ended = fm.trace(scene, start=0.8, direction=-1)
+    again = fm.trace(scene, start=ended)
+    assert (again.status, len(again)) == (fm.Status.SLACK, len(ended))
+    assert not len(fm.equilibria(scene, volume=0.21))
+    for eq in ended[:-1]:  # what is called converged is not called slack
+        assert eq.status is fm.Status.CONVERGED
+    assert eq.center_height > FOLD["center_height"]
 
 
 def test_beyond_the_slack_circle_the_meridian_of_the_model_crosses_itself():

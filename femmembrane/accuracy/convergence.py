@@ -234,8 +234,8 @@ def observed_orders(errors: Array, elements: Sequence[int]) -> Array:
 def richardson(values: Array, elements: Sequence[int], degree: int) -> tuple[float, float]:
     """The limit of values that converge like (1/n)^q, from the three finest with q fitted to them, and its estimated error.
 
-    The error is the distance to the limit from the three meshes before, or from the finest value when there are no more than three. Where
-    no q between 1/2 and 2 degree + 2 fits (round-off, too coarse a mesh), the finest value stands, with the last change for its error.
+    The error is the distance to the limit from the three meshes before; three alone cannot confirm their q, and the error is the last
+    change. Where no q between 1/2 and 2 degree + 1/2 fits (round-off, too coarse a mesh), the finest value stands, with the same error.
 
     Parameters
     ----------
@@ -255,8 +255,7 @@ def richardson(values: Array, elements: Sequence[int], degree: int) -> tuple[flo
     if limit is None:
         return float(v[-1]), change
     before = _limit(v[-4:-1], n[-4:-1], degree) if v.size > 3 else None
-    error = abs(limit - (float(v[-1]) if before is None else before))
-    return limit, max(error, floor)
+    return limit, change if before is None else max(abs(limit - before), floor)
 
 
 def _limit(v: Array, n: Array, degree: int) -> float | None:
@@ -270,7 +269,7 @@ def _limit(v: Array, n: Array, degree: int) -> float | None:
         h = (n / n[2]) ** -q
         return float((h[0] - h[1]) / (h[1] - h[2]) - ratio)
 
-    lowest, highest = 0.5, 2.0 * degree + 2
+    lowest, highest = 0.5, 2.0 * degree + 0.5
     if excess(lowest) * excess(highest) > 0:
         return None
     h = (n / n[2]) ** -brentq(excess, lowest, highest)

@@ -107,7 +107,8 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
             size = np.abs(np.diag(schur))
             unit = 1 / np.sqrt(np.where(size > 0, size, 1.0))  # a congruence: u and w of a nearly flat membrane differ by many decades
             schur *= np.outer(unit, unit)
-            return int((np.linalg.eigvalsh(schur) < 0).sum()) - borders.shape[1]
+            zero = -np.finfo(float).eps * len(schur)  # directions without stiffness, of the flat unloaded disc, are not negative ones
+            return int((np.linalg.eigvalsh(schur) < zero).sum()) - borders.shape[1]
         if count >= n:
             break
     return _sparse_count(band, kd, constraint, compliance)
@@ -115,8 +116,14 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
 
 @lru_cache(maxsize=64)
 def _spread(n: int, count: int) -> np.ndarray:
-    """Unknowns to pin, spread evenly; the first ones belong to the pole."""
-    return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
+    """Unknowns to pin, spread evenly; the first ones belong to the pole.
+
+    Many are pinned in pairs of neighbours, u and w of one node: evenly spaced ones may all be of one kind, and leave the other free.
+    """
+    if count <= 4:
+        return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
+    first = np.linspace(0, n - 1, count + 1)[:-1:2].astype(int)
+    return np.unique(np.clip(np.concatenate([first, first + 1]), 0, n - 1))
 
 
 def _pin(upper: Array, pins: np.ndarray) -> Array:

@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .accuracy.convergence import Convergence as Convergence
     from .accuracy.error_estimate import Deviation as Deviation
     from .accuracy.error_estimate import ErrorEstimate as ErrorEstimate
     from .discretization.meridian import Disc as Disc
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from .stability.zones import Zone as Zone
     from .stability.zones import Zones as Zones
     from .verbs import Equilibria as Equilibria
+    from .verbs import convergence as convergence
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
     from .verbs import fold_curve as fold_curve
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _ROOMS = {
+    "accuracy.convergence": ("Convergence",),
     "accuracy.error_estimate": ("Deviation", "ErrorEstimate"),
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
@@ -70,7 +73,9 @@ _ROOMS = {
     "stability.verdict": ("Verdict",),
     "stability.zones": ("Zone", "Zones"),
     "verbs.folds": ("Cusp", "FoldCurve"),
-    "verbs": ("Equilibria", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace", "trace_iter"),
+    "verbs": (
+        *("Equilibria", "convergence", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace", "trace_iter"),
+    ),
     "views.modes": ("render_mode", "write_mode_vtk"),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}

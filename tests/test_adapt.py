@@ -125,6 +125,12 @@ def test_one_equilibrium():
     assert held.error_estimate().pressure.relative < 1e-7
 
 
+def test_convergence_study():
+    """Its meshes are graded like the one that was chosen."""
+    study = fm.convergence(asking(disc_scene(OGDEN), 1e-6), volume=5.0, degrees=(2,), elements=(8, 16, 32))
+    assert study.orders("pressure")[0, -1] == pytest.approx(4, abs=0.5)
+
+
 def test_a_start_on_any_mesh():
     """A start names a branch, not a mesh; a continued trace keeps the mesh chosen for it."""
     scene = asking(disc_scene(OGDEN), 1e-6)

@@ -50,6 +50,9 @@ class Meridian(Hashable, Protocol):
     def refined(self) -> Self:
         """The same shape with every element halved."""
 
+    def with_elements(self, elements: int) -> Self:
+        """The same shape, graded alike, with another number of elements."""
+
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         """Displacements held at the first and last point: subsets of {"u", "w"}."""
 
@@ -141,6 +144,22 @@ class Disc:
         halved = np.empty(2 * self.elements + 1)
         halved[::2], halved[1::2] = ends, ends[:-1] + np.diff(ends) / 2
         return type(self)(radii=tuple(halved))
+
+    def with_elements(self, elements: int) -> Self:
+        """Another number of elements whose ends are the same function of k/elements, so that those of n elements are among those of 2 n.
+
+        Between given ``radii`` that function is linear.
+        """
+        if elements == self.elements:
+            return self
+        if self.radii is not None:
+            ends = np.interp(np.linspace(0, self.elements, elements + 1), np.arange(self.elements + 1), self.radii)
+            return type(self)(radii=tuple(ends))
+        if self.ratio == 1 or self.elements == 1:
+            return type(self)(elements)
+        growth = math.log(self.ratio) * self.elements / (self.elements - 1)
+        ratio = math.exp(growth * (elements - 1) / elements)
+        return type(self)(elements, min(max(ratio, 1 / MAX_RATIO), MAX_RATIO))
 
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         return frozenset({"u"}), frozenset({"u", "w"})

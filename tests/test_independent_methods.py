@@ -66,9 +66,9 @@ def test_radii_of_a_guess(r):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_failure_is_said(method, near):
-    """Nothing is at a pressure far above the limit point (1.90 without a dipole): no method may claim to have found it."""
+    """A neo-Hookean membrane holds no pressure above its limit point, 1.9 or so: no method may claim to have found that state."""
     limits = {"max_nodes": 500} if method is collocate else {"max_iterations": 2}
-    found = method(SCENE, guess=near, pressure=40.0, **limits)
+    found = method(disc_scene(fm.NeoHookean()), guess=near, pressure=9.0, **limits)
     assert not found.converged
     assert found.residual > 1e-4
     assert found.message

@@ -51,19 +51,20 @@ def collocate(
     control, load = prescribed(volume, pressure, center_height)
     aim = check_tolerance("tolerance", tolerance, 1e-13)
     form = StrongForm(scene)
-    r, first = _first(form, guess, volume=control == "volume")
+    scale = max(abs(load), 1.0) if control == "volume" else 0.0  # a large volume would hide the round-off of the rest
+    r, first = _first(form, guess, scale)
     n = len(first)
     singular = np.zeros((n, n))
     singular[:4, :4] = SINGULAR
 
     def equations(r: Array, y: Array, p: Array | None = None) -> Array:
         f = form.regular(r, y[:4], load if p is None else p[0])
-        return f if n == 4 else np.vstack([f, form.densities(r, y[:4])[:1]])
+        return f if n == 4 else np.vstack([f, form.densities(r, y[:4])[:1] / scale])
 
     def conditions(pole: Array, rim: Array, p: Array | None = None) -> Array:
         ends = [pole[2], pole[3], rim[0], rim[1]]
         if control == "volume":
-            ends += [pole[4], rim[4] - load]
+            ends += [pole[4], rim[4] - load / scale]
         elif control == "center_height":
             ends.append(pole[1] - load)
         return np.array(ends)
@@ -74,8 +75,8 @@ def collocate(
     return _solution(form, found, conditions, load if control == "pressure" else None, aim)
 
 
-def _first(form: StrongForm, guess: Guess, volume: bool) -> tuple[Array, Array]:
-    """Mesh and unknowns from the profile of a guess."""
+def _first(form: StrongForm, guess: Guess, scale: float) -> tuple[Array, Array]:
+    """Mesh and unknowns from the profile of a guess; with a scale the volume over it is one of them."""
     if guess.profile is None:
         raise InputError("guess.profile", None, "missing; collocation sets out from a profile with columns r, rho and eta")
     r, rho, eta = (np.asarray(guess.profile[name], dtype=float) for name in ("r", "rho", "eta"))
@@ -91,9 +92,9 @@ def _first(form: StrongForm, guess: Guess, volume: bool) -> tuple[Array, Array]:
     d = np.log(np.hypot(rho_r, eta_r) / l2)
     d[0] = phi[0] = 0.0
     y = np.array([np.log(l2), eta, d, phi])
-    if not volume:
+    if not scale:
         return r, y
-    density = CubicSpline(r, form.densities(r, y)[0])
+    density = CubicSpline(r, form.densities(r, y)[0] / scale)
     return r, np.vstack([y, density.antiderivative()(r)])
 
 

@@ -3,13 +3,13 @@
 The paper marks a membrane as wrinkled where a principal total stress is compressive, and computes its shape as if it were not (figures 7,
 8 and 9). Here each state is solved twice: as a plain membrane, and as a tension field, whose strain energy is relaxed so that it carries
 no compression. The table has for both the pressure, the volume, the verdict at a held volume, and the smallest number of waves around the
-axis against which the state is unstable (short: waves shorter than any, for compressive stress); and the share of the area that is
-wrinkled by the criterion that the energy itself feels (mechanical) and by the paper's (total).
+axis, up to 12, against which the state is unstable (short: waves shorter than any, for compressive stress). It also has the share of the
+area that is wrinkled by the criterion that the energy itself feels (mechanical) and by the paper's (total).
 
 1. Where the membrane is wrinkled by its total stress alone (figure 7; figure 9 at large volumes) the tension field changes nothing:
    the magnetic part of that stress comes with a force that depends on the position only, which the energy has already.
 2. At a pole below the rim (figure 8) an annulus is compressed around the axis. At the same height of the pole the tension field encloses
-   up to a fifth more volume; with M = 400, h = -3.25 and the pole at -0.4 the verdict at a held volume turns. Against few waves around
+   up to 0.04 R0^3 more; with M = 400, h = -3.25 and the pole at -0.4 the verdict at a held volume turns. Against few waves around
    the axis the tension field has verdicts where the plain membrane is short-wave unstable. Against many it is unstable too, as far as it
    is wrinkled: the sheet carries nothing across the wrinkles, and the pressure bulges it between them.
 3. With M = 600, h = -3.25 (figure 9, pole falling) the plain membrane is at last compressed along its meridian and its states depend on

@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .accuracy.convergence import Convergence as Convergence
     from .discretization.meridian import Disc as Disc
     from .discretization.meridian import disc as disc
     from .errors import FemmembraneError as FemmembraneError
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from .stability.zones import Zone as Zone
     from .stability.zones import Zones as Zones
     from .verbs import Equilibria as Equilibria
+    from .verbs import convergence as convergence
     from .verbs import cost as cost
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _ROOMS = {
+    "accuracy.convergence": ("Convergence",),
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.magnetics": ("Dipole",),
@@ -70,7 +73,21 @@ _ROOMS = {
     "stability.zones": ("Zone", "Zones"),
     "verbs.cost": ("Cost",),
     "verbs.folds": ("Cusp", "FoldCurve"),
-    "verbs": ("Equilibria", "cost", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace", "trace_iter"),
+    "verbs": (
+        *(
+            "Equilibria",
+            "convergence",
+            "cost",
+            "equilibria",
+            "equilibrium",
+            "fold_curve",
+            "inflate",
+            "pressurize",
+            "run",
+            "trace",
+            "trace_iter",
+        ),
+    ),
     "views.modes": ("render_mode", "write_mode_vtk"),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}

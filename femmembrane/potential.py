@@ -11,6 +11,7 @@ same for the Newton corrector (NumPy arrays, banded) and for IPOPT (CasADi funct
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,20 +40,31 @@ _BLOCK = 1024
 
 @dataclass(slots=True)
 class Evaluation:
-    """Value, gradient and Hessian of E and V at one state; energies and volume with the 2 pi.
+    """Value, gradient and Hessian of E and V at one state x; energies and volume with the 2 pi.
 
-    ``band`` holds E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free); ``stress`` the principal mechanical stresses at the
-    quadrature points, shape (2, n_points); ``force_density`` what was integrated to the two gradients, for judging a residual.
+    ``stress`` are the principal mechanical stresses at the quadrature points, shape (2, n_points); ``force_density`` is what was
+    integrated to the two gradients, for judging a residual; ``stiffness_density`` is what :attr:`band` integrates.
     """
 
+    x: Array
     elastic_energy: float
     magnetic_energy: float
     volume: float
     gradient: Array
     volume_gradient: Array
-    band: Array
     stress: Array
     force_density: Array
+    stiffness_density: Array
+    space: Space
+    _band: Array | None = None
+
+    @property
+    def band(self) -> Array:
+        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
+        if self._band is None:
+            with np.errstate(invalid="ignore"):
+                self._band = self.space.assemble_band(self.stiffness_density)
+        return self._band
 
     @property
     def energy(self) -> float:
@@ -132,8 +144,8 @@ class Potential:
             e, m, v = out[:3].sum(axis=1).tolist()
             force_density = out[3:11].copy()
             gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
-            band = space.assemble_band(out[11:21].reshape(-1, space.n_elements))
-        return Evaluation(e, m, v, gradient, volume_gradient, band, out[21:23].copy(), force_density)
+        stiffness_density = out[11:21].reshape(-1, space.n_elements).copy()
+        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, space)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
@@ -141,8 +153,8 @@ class Potential:
             return np.inf
         space = self.space
         u, _, w, _ = space.at_quadrature(x).reshape(4, *space.R.shape)
-        rho, eta = np.append(space.R + u, 0.0), np.append(space.Z + w, space.center_height(x))
-        return float(min(np.sqrt(source.distance_squared(rho, eta).min()) for source in self.sources))
+        rho, eta, pole = space.R + u, space.Z + w, space.center_height(x)
+        return min(math.sqrt(min(s.distance_squared(rho, eta).min(), s.distance_squared(0.0, pole))) for s in self.sources)
 
     def passed_source(self, before: Array, after: Array) -> bool:
         """Whether the pole went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""

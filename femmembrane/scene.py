@@ -533,7 +533,8 @@ def _ratio(key: str, value: Any, scales: Scales | None) -> float:
         return ratio
     if not math.isclose(ratio, scales.radius_to_thickness, rel_tol=AGREEMENT):
         follows = f"scales.radius / scales.thickness = {scales.radius_to_thickness:.12g}"
-        raise InputError(key, value, f"it contradicts {follows}; leave radius_to_thickness out, and it follows from the scales")
+        advice = "leave radius_to_thickness out, and it follows from the scales (Scene.replace does so when it is given other scales)"
+        raise InputError(key, value, f"it contradicts {follows}; {advice}")
     return scales.radius_to_thickness
 
 

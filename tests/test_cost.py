@@ -200,6 +200,14 @@ def test_a_height_has_no_minimiser():
     assert found.reference.value == pytest.approx(LISTED["pressure"], rel=1e-12)
 
 
+def test_meshes_are_graded_like_the_scene_s():
+    """Elements ten times smaller at the rim: the same equilibrium with other errors, and the same number of unknowns."""
+    graded, even = (study(SCENE.replace(mesh=mesh), volume=1.0, degrees=(2,)) for mesh in (fm.disc(8, ratio=0.1), fm.disc(8)))
+    assert graded.reference.value == pytest.approx(even.reference.value, rel=1e-12)
+    assert [line.unknowns for line in graded.lines] == [line.unknowns for line in even.lines]
+    assert all(abs(a.error / b.error - 1) > 0.1 for a, b in zip(graded.lines, even.lines, strict=True))
+
+
 def test_tension_field_has_no_independent_methods():
     scene = SCENE.replace(tension_field=True)
     assert {line.method for line in study(scene, volume=1.0, methods=None).lines} == {"newton", "ipopt"}

@@ -434,6 +434,31 @@ def test_a_trace_continued_with_scales_has_them_from_its_start():
     assert whole.to_xarray()["total_stress_1_pa"].shape == (len(whole), 17)  # 8 quadratic elements
 
 
+def test_zones_of_a_continued_trace_are_those_of_its_scene():
+    """Total stresses depend on R0/T, and so on the scales; zones asked for before may not be carried along."""
+    thick = MAGNETIC.replace(radius_to_thickness=2.0, analysis=fm.Analysis(wrinkling="total"))
+    half = fm.trace(MAGNETIC, start=0.6, until={"volume": 4.0}, max_steps=3)
+    before = half[0].zones("total")
+    whole = fm.trace(thick, start=half, until={"volume": 4.0})
+    fresh = fm.trace(thick, start=0.6, until={"volume": 4.0})
+    assert whole[0].zones() == fresh[0].zones() != before
+
+
+@pytest.mark.parametrize(("quantity", "value"), [("stress", 1e305), ("stress", [1.0, 1e305]), ("energy", -1e308)])
+def test_values_that_no_float_holds(quantity, value):
+    scales = fm.Scales(0.02, 2e-5, 4e5) if quantity == "stress" else fm.Scales(2e3, 2e1, 4e5)
+    with pytest.raises(InputError, match=r"^value = ") as caught:
+        scales.to_si(quantity, value)
+    assert "a float can hold" in str(caught.value)
+    assert scales.to_si(quantity, np.inf) == np.inf
+
+
+@pytest.mark.parametrize(("quantity", "value"), [("volume", 1e305), ("dipole_strength", 1e300)])
+def test_si_values_that_no_float_holds(quantity, value):
+    with pytest.raises(InputError, match=r"^value = "):
+        fm.Scales(0.02, 2e-5, 4e5).from_si(quantity, value)
+
+
 def test_run_of_a_scene_file(tmp_path):
     """From a moment in A m^2 to a pressure in Pa: the folder is that of a scene with the strength written out, and two numbers more."""
     text = """

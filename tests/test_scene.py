@@ -55,6 +55,13 @@ def test_defaults():
     assert (scene.mesh, scene.degree, scene.sources, scene.run) == (disc(elements=64), 2, (), None)
 
 
+def test_radii_say_how_many_elements_there_are():
+    scene = Scene.from_dict(plain(mesh={"radii": [0, 0.25, 1]}))
+    assert scene.mesh == disc(radii=np.array([0, 0.25, 1])) == disc(2, radii=(0.0, 0.25, 1.0))
+    assert (scene.mesh.elements, scene.to_dict()["mesh"]["radii"]) == (2, [0.0, 0.25, 1.0])
+    assert hash(scene.mesh) == hash(disc(radii=[0, 0.25, 1]))
+
+
 def test_lists_become_tuples_and_scenes_are_hashable():
     scene = Scene(material=NeoHookean(), sources=[Dipole(1, 2)], susceptibility=1, run=Run(values=np.array([0.5, 1])))
     other = Scene(material=NeoHookean(), sources=(Dipole(1, 2),), susceptibility=1.0, run=Run(values=(0.5, 1.0)))
@@ -141,7 +148,10 @@ dipoles = st.builds(Dipole, strength=positive | st.integers(0, 600), height=heig
 scenes = st.builds(
     Scene,
     material=materials,
-    mesh=st.integers(1, 500).map(disc),
+    mesh=st.one_of(
+        st.builds(disc, elements=st.integers(1, 500), ratio=st.floats(1e-6, 1e6)),
+        st.sets(st.floats(1e-3, 0.999), max_size=9).map(lambda inner: disc(radii=(0, *sorted(inner), 1))),
+    ),
     degree=st.integers(1, 8),
     sources=st.lists(dipoles, max_size=3),
     susceptibility=st.floats(0, 10),
@@ -249,6 +259,21 @@ REFUSED = [
     (plain(mesh={"elements": -4}), "mesh.elements", ">= 1"),
     (plain(mesh={"elements": 4.0}), "mesh.elements", "whole number"),
     (plain(mesh={"elements": True}), "mesh.elements", "whole number"),
+    (plain(mesh={"elements": 64, "radii": [0, 0.5, 1]}), "mesh.elements", "contradicts mesh.radii, the ends of 2"),
+    (plain(mesh={"ratio": 0}), "mesh.ratio", "from 1e-06 to 1e+06"),
+    (plain(mesh={"ratio": 2e6}), "mesh.ratio", "from 1e-06 to 1e+06"),
+    (plain(mesh={"ratio": NAN}), "mesh.ratio", "from 1e-06 to 1e+06"),
+    (plain(mesh={"ratio": "2"}), "mesh.ratio", "from 1e-06 to 1e+06"),
+    (plain(mesh={"ratio": True}), "mesh.ratio", "from 1e-06 to 1e+06"),
+    (plain(mesh={"ratio": 2, "radii": [0, 0.5, 1]}), "mesh.ratio", "together with mesh.radii"),
+    (plain(mesh={"radii": 0.5}), "mesh.radii", "from 0 (the pole) to 1 (the rim)"),
+    (plain(mesh={"radii": "01"}), "mesh.radii", "from 0 (the pole) to 1 (the rim)"),
+    (plain(mesh={"radii": []}), "mesh.radii", "from 0 (the pole) to 1 (the rim)"),
+    (plain(mesh={"radii": [0.1, 1]}), "mesh.radii", "from 0 (the pole) to 1 (the rim)"),
+    (plain(mesh={"radii": [0, 0.9]}), "mesh.radii", "from 0 (the pole) to 1 (the rim)"),
+    (plain(mesh={"radii": [0, 0.5, 0.5, 1]}), "mesh.radii[2]", "above the one before (0.5)"),
+    (plain(mesh={"radii": [0, "a", 1]}), "mesh.radii[1]", "finite number"),
+    (plain(mesh={"radii": [0, INF, 1]}), "mesh.radii[1]", "finite number"),
     (plain(mesh={"degree": 0}), "mesh.degree", "from 1 to 8"),
     (plain(mesh={"degree": 9}), "mesh.degree", "from 1 to 8"),
     (plain(mesh={"degree": 2.0}), "mesh.degree", "from 1 to 8"),

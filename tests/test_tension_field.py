@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -186,8 +185,8 @@ def test_off_builds_nothing():
     assert {"OP_LE", "OP_LT"} & on.keys()
     exponentials = ("OP_EXP", "OP_EXPM1", "OP_LOG1P", "OP_LOG")
     assert [on.get(name, 0) for name in exponentials] == [off.get(name, 0) for name in exponentials]
-    # recorded on 2026-11-24: 340 and 370
-    assert 0 < Potential(plain.replace(tension_field=True)).operations - Potential(plain).operations <= 40
+    # recorded on 2026-11-24: 340 and 369
+    assert 0 < Potential(plain.replace(tension_field=True)).operations - Potential(plain).operations <= 30
 
 
 TAUT = [((200.0, 6.5), np.linspace(0.5, 75, 30)), ((400.0, -3.75), np.linspace(0.5, 0.2, 7)), (None, np.linspace(0.01, 40, 20))]
@@ -285,10 +284,3 @@ def test_a_limit_point_with_wrinkles_is_followed_as_far_as_its_derivatives_go():
     with pytest.raises(fm.SolveError, match="no third derivatives, which this needs: trace at each value instead") as caught:
         fold_curve(scene, start=start, parameter="source.0.strength", bounds=(400.0, 450.0))
     assert len(caught.value.result) >= 1
-
-
-def test_symbols_only_where_casadi_lives():
-    """Material formulas do not import CasADi: they work on its symbols through NumPy's operators."""
-    e = ca.SX.sym("e", 2)
-    assert isinstance(TensionField(fm.Ogden((1.0,), (2.0,))).material, fm.Ogden)
-    assert isinstance(natural_strains(e[0], e[1])[0], ca.SX)

@@ -442,6 +442,19 @@ def test_no_zones_within_a_snap(branch: Branch, order: int) -> None:
     assert [sorted(line.get_xydata().tolist()) for line in axes.lines] == expected
 
 
+def test_no_border_across_a_snap_between_equal_kinds(branch: Branch) -> None:
+    """Two states with the same kinds of zones and a snap between: two stretches of border, not one line."""
+    shown = wrinkled(branch)
+    first = shown.equilibria[0]
+    landing = dataclasses.replace(first, volume=first.volume + 1.0)
+    assert first.zones().borders
+    snapping = dataclasses.replace(shown, equilibria=(first, landing), jumps=(Jump(1, None, landing),))
+    (axes,) = plots.plot_zones(snapping).axes
+    assert len(axes.lines) == 2 * len(first.zones().borders)
+    for line in axes.lines:
+        assert np.ptp(line.get_xdata()) == pytest.approx(0.5)
+
+
 def test_plots_refuse(branch: Branch) -> None:
     for plot in (plots.plot_pressure_volume, plots.plot_profiles, plots.plot_zones):
         with pytest.raises(InputError, match="one or more equilibria"):

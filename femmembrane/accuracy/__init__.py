@@ -1,1 +1,1 @@
-"""How accurate an answer is and what it costs: methods that share nothing with the finite elements, and work-precision studies."""
+"""How accurate an answer is and what it costs: convergence, methods that share nothing with the finite elements, work against precision."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, SolveError, Status
+from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
@@ -272,13 +272,9 @@ class Course:
         self.reference = Reference(value, error, elements, MAX_DEGREE)
 
     def on_mesh(self, elements: int, degree: int) -> Scene:
-        """The scene on another mesh of the same shape, and nothing asked of it."""
-        mesh: Any = self.scene.mesh
-        try:
-            finer = replace(mesh, elements=elements)
-        except TypeError:
-            raise InputError("mesh", mesh, "a mesh with a number of elements is allowed, such as disc(elements=64)") from None
-        return self.scene.replace(mesh=finer, degree=degree, run=None, analysis=type(self.scene.analysis)())
+        """The scene on another mesh of the same shape, graded alike, and nothing asked of it."""
+        mesh = self.scene.mesh.with_elements(elements)
+        return self.scene.replace(mesh=mesh, degree=degree, run=None, analysis=type(self.scene.analysis)())
 
     def quantity(self, state: Any) -> float:
         """What is compared: the pressure, or the volume where the pressure is given."""

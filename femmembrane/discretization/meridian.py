@@ -6,9 +6,11 @@ general curve, so a new shape is a new class here and nothing more.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from dataclasses import dataclass, replace
-from typing import Protocol, Self
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,11 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 Array = NDArray[np.float64]
+
+#: number of elements unless something else is said
+ELEMENTS = 64
+#: ratios of sizes reach from one over this to this: beyond, the smallest elements drown in round-off
+MAX_RATIO = 1e6
 
 
 class Meridian(Hashable, Protocol):
@@ -41,6 +48,9 @@ class Meridian(Hashable, Protocol):
     def refined(self) -> Self:
         """The same shape with every element halved."""
 
+    def with_elements(self, elements: int) -> Self:
+        """The same shape, graded alike, with another number of elements."""
+
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         """Displacements held at the first and last point: subsets of {"u", "w"}."""
 
@@ -59,27 +69,48 @@ class Disc:
     Parameters
     ----------
     elements : int
-        Number of elements along the radius, all of the same size.
+        Number of elements along the radius; 64, or as many as ``radii`` says.
+    ratio : float
+        Size of the element at the rim over that of the element at the pole, 1e-6 to 1e6; sizes follow a geometric progression.
+    radii : sequence of float, optional
+        Ends of the elements, over R0, strictly increasing from 0 to 1: any other grading, in place of ``elements`` and ``ratio``.
 
     Raises
     ------
     InputError
-        When elements is not a positive integer.
+        For a value outside these sets, and for radii that contradict ``elements`` or come with a ratio.
     """
 
-    elements: int = 64
+    elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
+    ratio: float = 1.0
+    radii: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.elements, bool) or not isinstance(self.elements, (int, np.integer)) or self.elements < 1:
-            raise InputError("mesh.elements", self.elements, "a whole number >= 1 is allowed")
-        object.__setattr__(self, "elements", int(self.elements))
+        ratio = _ratio(self.ratio)
+        radii = None if self.radii is None else _radii(self.radii)
+        follows = ELEMENTS if radii is None else len(radii) - 1
+        elements = follows if self.elements is None else self.elements
+        if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)) or elements < 1:
+            raise InputError("mesh.elements", elements, "a whole number >= 1 is allowed")
+        if radii is not None and elements != follows:
+            raise InputError("mesh.elements", elements, f"it contradicts mesh.radii, the ends of {follows}; leave elements out")
+        if radii is not None and ratio != 1:
+            raise InputError("mesh.ratio", ratio, "not allowed together with mesh.radii, which say all about the sizes; leave one out")
+        for name, value in (("elements", int(elements)), ("ratio", ratio), ("radii", radii)):
+            object.__setattr__(self, name, value)
 
     @property
     def shape(self) -> str:
         return "disc"
 
     def breakpoints(self) -> Array:
-        return np.linspace(0.0, 1.0, self.elements + 1)
+        if self.radii is not None:
+            return np.array(self.radii)
+        if self.ratio == 1 or self.elements == 1:
+            return np.linspace(0.0, 1.0, self.elements + 1)
+        # (q^k - 1)/(q^n - 1) with the quotient q of neighbouring sizes; expm1 keeps the digits of the first, smallest ends
+        growth = np.arange(self.elements + 1) * (math.log(self.ratio) / (self.elements - 1))
+        return np.expm1(growth) / math.expm1(growth[-1])
 
     def position(self, s: Array) -> tuple[Array, Array]:
         return s, np.zeros_like(s)
@@ -88,12 +119,59 @@ class Disc:
         return np.ones_like(s), np.zeros_like(s)
 
     def refined(self) -> Self:
-        return replace(self, elements=2 * self.elements)
+        if self.ratio == 1 and self.radii is None:
+            return type(self)(2 * self.elements)
+        ends = self.breakpoints()
+        halved = np.empty(2 * self.elements + 1)
+        halved[::2], halved[1::2] = ends, ends[:-1] + np.diff(ends) / 2
+        return type(self)(radii=tuple(halved))
+
+    def with_elements(self, elements: int) -> Self:
+        """Another number of elements whose ends are the same function of k/elements, so that those of n elements are among those of 2 n.
+
+        Between given ``radii`` that function is linear.
+        """
+        if elements == self.elements:
+            return self
+        if self.radii is not None:
+            ends = np.interp(np.linspace(0, self.elements, elements + 1), np.arange(self.elements + 1), self.radii)
+            return type(self)(radii=tuple(ends))
+        if self.ratio == 1 or self.elements == 1:
+            return type(self)(elements)
+        growth = math.log(self.ratio) * self.elements / (self.elements - 1)
+        ratio = math.exp(growth * (elements - 1) / elements)
+        return type(self)(elements, min(max(ratio, 1 / MAX_RATIO), MAX_RATIO))
 
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         return frozenset({"u"}), frozenset({"u", "w"})
 
 
-def disc(elements: int = 64) -> Disc:
-    """Mesh of the flat, clamped disc with ``elements`` equal elements along the radius; see :class:`Disc`."""
-    return Disc(elements=elements)
+def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float] | None = None) -> Disc:
+    """Mesh of the flat, clamped disc: ``elements`` along the radius, graded by ``ratio`` or ending at ``radii``; see :class:`Disc`."""
+    return Disc(elements=elements, ratio=ratio, radii=radii)  # type: ignore[arg-type]  # checked there
+
+
+def _ratio(value: Any) -> float:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 1 / MAX_RATIO <= float(value) <= MAX_RATIO:
+        allowed = f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed (size at the rim over size at the pole)"
+        raise InputError("mesh.ratio", value, allowed)
+    return float(value)
+
+
+def _radii(values: Any) -> tuple[float, ...]:
+    allowed = "a list of numbers that increase strictly from 0 (the pole) to 1 (the rim) is allowed"
+    if isinstance(values, (str, bytes)):
+        raise InputError("mesh.radii", values, allowed)
+    try:
+        ends = tuple(values)
+    except TypeError:
+        raise InputError("mesh.radii", values, allowed) from None
+    for k, end in enumerate(ends):
+        if isinstance(end, (bool, np.bool_)) or not isinstance(end, Real) or not math.isfinite(end):
+            raise InputError(f"mesh.radii[{k}]", end, "a finite number is allowed")
+    if len(ends) < 2 or ends[0] != 0 or ends[-1] != 1:
+        raise InputError("mesh.radii", ends, allowed)
+    for k in range(1, len(ends)):
+        if not ends[k - 1] < ends[k]:
+            raise InputError(f"mesh.radii[{k}]", ends[k], f"a number above the one before ({ends[k - 1]:.9g}) is allowed")
+    return tuple(float(end) for end in ends)

@@ -77,6 +77,7 @@ class Space:
         zero = np.zeros_like(value)
         blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
         self.table = np.block(blocks)
+        self._magnitudes = np.abs(self.table)
         rows = self.table.reshape(4, self.n_quadrature, -1)
         outer = []
         for i, j in HESSIAN_PAIRS:
@@ -128,7 +129,7 @@ class Space:
 
     def assemble_magnitude(self, density: Array) -> Array:
         """As :meth:`assemble_vector` for a density >= 0, with no cancellation between shape functions or elements."""
-        return _sum_by(self._gather_flat, np.abs(self.table).T @ density, self.n_free + 1)[: self.n_free]
+        return _sum_by(self._gather_flat, self._magnitudes.T @ density, self.n_free + 1)[: self.n_free]
 
     def assemble_band(self, density: Array) -> Array:
         """Integrate second derivatives, shape (10 n_quadrature, n_elements) in the order of HESSIAN_PAIRS.
@@ -213,6 +214,13 @@ class Space:
         u, w = (np.einsum("qa,aq->q", value, c) for c in (coefficients[:n_local], coefficients[n_local:]))
         u_s, w_s = (np.einsum("qa,aq->q", slope, c) / size for c in (coefficients[:n_local], coefficients[n_local:]))
         return u, u_s, w, w_s
+
+    def at_inner_ends(self, x: Array) -> tuple[Array, Array, Array, Array]:
+        """(u, u_s, w, w_s) where two elements meet, each of shape (n_elements - 1,): slopes, which jump there, as the mean of both."""
+        value, slope = self.shape_functions(np.array([0.0, 1.0]))
+        u, w = np.split(self.extend(x)[self.gather], 2)
+        u_s, w_s = ((lambda both: (both[1, :-1] + both[0, 1:]) / 2)(slope @ c / self.sizes) for c in (u, w))
+        return (value @ u)[0, 1:], u_s, (value @ w)[0, 1:], w_s
 
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.

@@ -82,8 +82,8 @@ class Scales:
             self._unit(quantity)
         self._in_range("radius over thickness", self.radius_to_thickness)
         if self.dipole_moment is not None:
-            with np.errstate(over="ignore"):  # refused in the next line
-                self._in_range("the strength of dipole_moment", self.strength)
+            ratio = self.dipole_moment / self._unit("dipole_strength")
+            self._in_range("the strength of dipole_moment", ratio * ratio)
 
     @property
     def radius_to_thickness(self) -> float:
@@ -138,10 +138,11 @@ class Scales:
         Raises
         ------
         InputError
-            For an unknown quantity, a value that is no number, or a negative dipole strength.
+            For an unknown quantity, a value that is no number or too large for a float in SI units, or a negative dipole strength.
         """
         given = _values(quantity, value)
-        return _plain((np.sqrt(given) if quantity == "dipole_strength" else given) * self._unit(quantity))
+        with np.errstate(over="ignore"):
+            return _converted(value, given, (np.sqrt(given) if quantity == "dipole_strength" else given) * self._unit(quantity))
 
     @overload
     def from_si(self, quantity: str, value: float) -> float: ...
@@ -155,10 +156,13 @@ class Scales:
         Raises
         ------
         InputError
-            For an unknown quantity, a value that is no number, or a negative moment (a dipole's orientation holds its sense).
+            For an unknown quantity, a value that is no number or too large for a float without its unit, or a negative moment (a dipole's
+            orientation holds its sense).
         """
-        ratio = _values(quantity, value) / self._unit(quantity)
-        return _plain(ratio * ratio if quantity == "dipole_strength" else ratio)
+        given = _values(quantity, value)
+        with np.errstate(over="ignore"):
+            ratio = given / self._unit(quantity)
+            return _converted(value, given, ratio * ratio if quantity == "dipole_strength" else ratio)
 
     def fits(self, sources: Iterable[Any]) -> bool:
         """Whether ``dipole_moment``, if given, is that of one of the sources, to 1e-9 of its strength."""
@@ -201,5 +205,7 @@ def _values(quantity: str, value: Any) -> Array:
     return array.astype(np.float64)
 
 
-def _plain(values: Any) -> float | Array:
-    return values if np.ndim(values) else float(values)
+def _converted(value: Any, given: Array, result: Any) -> float | Array:
+    if (np.isinf(result) & np.isfinite(given)).any():
+        raise InputError("value", value, "a value is allowed that a float can hold in the other unit, too")
+    return result if np.ndim(result) else float(result)

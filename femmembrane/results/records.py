@@ -83,6 +83,10 @@ class Equilibrium:
 
         return potential_of(self.scene)
 
+    def in_scene(self, scene: Scene) -> Equilibrium:
+        """The same equilibrium in a scene with the same potential, which may ask for or scale other things."""
+        return replace(self, scene=scene, _zones={})
+
     def profile(self, r: ArrayLike | None = None) -> dict[str, Array]:
         """The deformed meridian with stretches and stresses.
 

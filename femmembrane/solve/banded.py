@@ -87,10 +87,10 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
     # under a constraint one direction of K itself is usually negative already: pinning at once saves a factorisation that fails
     for count in (0, 4, 16, 64, 256, 1024) if constraint is None else (4, 16, 64, 256, 1024):
         pins = _spread(n, count)
-        pinned = _pin(upper, pins)
+        pinned = _pin(upper, count)
         factor, info = lapack.dpbtrf(pinned)
         if info == 0:
-            coupling = _columns(band, kd, pins)
+            coupling = _columns(band, kd, count)
             corner = coupling[pins].copy()
             coupling[pins] = 0.0
             free = borders.copy()
@@ -107,7 +107,8 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
             size = np.abs(np.diag(schur))
             unit = 1 / np.sqrt(np.where(size > 0, size, 1.0))  # a congruence: u and w of a nearly flat membrane differ by many decades
             schur *= np.outer(unit, unit)
-            return int((np.linalg.eigvalsh(schur) < 0).sum()) - borders.shape[1]
+            zero = -np.finfo(float).eps * len(schur)  # directions without stiffness, of the flat unloaded disc, are not negative ones
+            return int((np.linalg.eigvalsh(schur) < zero).sum()) - borders.shape[1]
         if count >= n:
             break
     return _sparse_count(band, kd, constraint, compliance)
@@ -115,30 +116,44 @@ def negative_directions(band: Array, half_bandwidth: int, constraint: Array | No
 
 @lru_cache(maxsize=64)
 def _spread(n: int, count: int) -> np.ndarray:
-    """Unknowns to pin, spread evenly; the first ones belong to the pole."""
-    return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
+    """Unknowns to pin, spread evenly; the first ones belong to the pole.
+
+    Many are pinned in pairs of neighbours, u and w of one node: evenly spaced ones may all be of one kind, and leave the other free.
+    """
+    if count <= 4:
+        return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
+    first = np.linspace(0, n - 1, count + 1)[:-1:2].astype(int)
+    return np.unique(np.clip(np.concatenate([first, first + 1]), 0, n - 1))
 
 
-def _pin(upper: Array, pins: np.ndarray) -> Array:
+@lru_cache(maxsize=64)
+def _couplings(n: int, kd: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows i and columns j of the entries within the band of the columns of the pins, and which pin each belongs to."""
+    pins = _spread(n, count)
+    i = pins + np.arange(-kd, kd + 1)[:, None]
+    inside = (i >= 0) & (i < n)
+    which = np.broadcast_to(np.arange(len(pins)), i.shape)[inside]
+    return i[inside], pins[which], which
+
+
+def _pin(upper: Array, count: int) -> Array:
     """Upper band storage with the rows and columns of the pins replaced by those of the identity."""
-    if not len(pins):
+    if not count:
         return upper
-    pinned, kd = upper.copy(order="F"), upper.shape[0] - 1
-    pinned[:, pins] = 0.0
-    for offset in range(1, kd + 1):
-        right = pins + offset
-        pinned[kd - offset, right[right < upper.shape[1]]] = 0.0
-    pinned[kd, pins] = 1.0
+    pinned, kd, n = upper.copy(order="F"), upper.shape[0] - 1, upper.shape[1]
+    i, j, _ = _couplings(n, kd, count)
+    low, high = np.minimum(i, j), np.maximum(i, j)
+    pinned[kd + low - high, high] = 0.0
+    pinned[kd, _spread(n, count)] = 1.0
     return pinned
 
 
-def _columns(band: Array, kd: int, pins: np.ndarray) -> Array:
-    """Dense columns of a band matrix."""
+def _columns(band: Array, kd: int, count: int) -> Array:
+    """Dense columns of a band matrix at the pins."""
     n = band.shape[1]
-    dense = np.zeros((n, len(pins)))
-    for k, j in enumerate(pins):
-        low, high = max(0, j - kd), min(n, j + kd + 1)
-        dense[low:high, k] = band[2 * kd + low - j : 2 * kd + high - j, j]
+    i, j, which = _couplings(n, kd, count)
+    dense = np.zeros((n, len(_spread(n, count))))
+    dense[i, which] = band[2 * kd + i - j, j]
     return dense
 
 

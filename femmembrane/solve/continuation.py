@@ -133,8 +133,7 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
 
 def oriented_point(potential: Potential, state: State, sigma: float, tangent: Array, tangent_pressure: float) -> BranchPoint:
     """The point of a state whose unit tangent is known."""
-    dual = band_product(potential.mass, potential.space.half_bandwidth, tangent) / potential.area
-    return BranchPoint(state, sigma, tangent, tangent_pressure, dual)
+    return BranchPoint(state, sigma, tangent, tangent_pressure, _dual(potential, tangent))
 
 
 def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> BranchPoint:
@@ -145,8 +144,14 @@ def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> Br
 
 
 def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
-    size = np.sqrt(inner(potential, tangent, tp, tangent, tp))
-    return oriented_point(potential, state, sigma, tangent / size, float(tp / size))
+    dual = _dual(potential, tangent)
+    size = np.sqrt(tangent @ dual + tp * tp)
+    return BranchPoint(state, sigma, tangent / size, float(tp / size), dual / size)
+
+
+def _dual(potential: Potential, tangent: Array) -> Array:
+    """What is multiplied with a displacement in the inner product of :func:`.state.inner` with a tangent."""
+    return band_product(potential.mass, potential.space.half_bandwidth, tangent) / potential.area
 
 
 def _square(potential: Potential, dx: Array, dp: float) -> float:

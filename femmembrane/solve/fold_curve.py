@@ -138,7 +138,7 @@ class _Equations:
         self.system, self.z, self.borders = system, z, borders
         self.evaluation = family.evaluate(z[:-2], float(z[-2]), float(z[-1]))
         self.force = self.evaluation.gradient - z[-2] * self.evaluation.volume_gradient
-        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(self.evaluation.band).all())
+        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(self.evaluation.stiffness_density).all())
 
     def factorise(self) -> None:
         """The null vector of the bordered singular matrix, g, and the derivatives of both."""

@@ -108,7 +108,7 @@ class Equations:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
         self.gap, row, corner = control.equation(potential.space, x, pressure, evaluation)
-        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.band).all())
+        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.stiffness_density).all())
         if bordered is None and self.finite:
             bordered = BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
         self.bordered = bordered

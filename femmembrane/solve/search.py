@@ -16,7 +16,7 @@ from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment
 from .start import flat_state, spherical_dome, start_at_volume
 from .state import Path, State, distance
-from .wellposed import ill_posed
+from .wellposed import ill_posed, is_slack
 
 #: volumes of the domes from which branches and deflated iterations set out
 STARTS = (0.5, -0.5, 5.0, -5.0, 50.0, -50.0)
@@ -135,7 +135,7 @@ class Search:
 
 
 def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator[Segment]:
-    """Segments of a branch until a step fails or the limit is reached."""
+    """Segments of a branch until a step fails, the limit is reached, or a tension field is slack and what follows is the mesh's."""
     tracer = Tracer(Path(), StepControl().first, StepControl())
     points = trace_points(potential, point, tracer)
     for _ in range(max_steps):
@@ -144,15 +144,21 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
         except SolveError:
             return
         yield Segment(potential, point, new)
+        if is_slack(potential, new.state):
+            return
         point = new
 
 
 @dataclass(slots=True)
 class Limit:
-    """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one."""
+    """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one.
+
+    ``slack`` is the state at which a tension field ended before either was met.
+    """
 
     fold: Located | None
     landing: State | None
+    slack: State | None = None
 
 
 def beyond_limit(
@@ -181,6 +187,8 @@ def beyond_limit(
             landing = segment.crossing(quantity, load).state
             if stable(landing):
                 return Limit(fold, landing)
+        if is_slack(potential, segment.b.state):
+            return Limit(fold, None, segment.b.state)
         if abs(segment.b.state.volume) > FAR:
             break
     return Limit(fold, None)

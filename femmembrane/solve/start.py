@@ -18,7 +18,7 @@ from .controls import CenterHeightControl, PressureControl, VolumeControl
 from .newton import correct
 from .state import Path, State
 from .stepping import march
-from .wellposed import ill_posed
+from .wellposed import ill_posed, is_slack
 
 #: below this volume a membrane with sources is reached from here: turning sources on at the flat state starts from a singular Hessian
 START_VOLUME = 0.5
@@ -168,6 +168,8 @@ def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, st
                 result = correct(potential, PressureControl(pressure), guess, pressure)
                 if result.status is Status.CONVERGED and negative_directions(result.evaluation.band, kd) == 0:
                     return State.of(result)
+            if is_slack(potential, new.state):
+                return None
             point = new
     except SolveError:
         return None

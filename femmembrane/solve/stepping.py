@@ -17,6 +17,7 @@ from .banded import BorderedFactor
 from .controls import Control
 from .newton import NewtonResult, correct
 from .state import Path, State, distance
+from .wellposed import is_slack, slackness
 
 #: largest change that the corrector may make, relative to the step
 MAX_DEVIATION = 0.2
@@ -63,7 +64,8 @@ def march(
     Raises
     ------
     SolveError
-        With status STEP_UNDERFLOW when steps become tiny; ``result`` holds the states accepted before.
+        With status STEP_UNDERFLOW when steps become tiny, SLACK when a tension field becomes slack before the end, DIPOLE_CONTACT;
+        ``result`` holds the states accepted before.
     """
     path = Path() if path is None else path
     factor_of = (lambda value: value) if parameter == "magnetic" else (lambda value: magnetic)
@@ -89,6 +91,8 @@ def march(
             accepted.append(new)
             here, spent = there, 0
             step *= 2
+            if parameter == "load" and here != stop and is_slack(potential, new):
+                raise slackness(potential, new, accepted)
         else:
             step = (there - here) / 2
             if abs(step) < shortest:

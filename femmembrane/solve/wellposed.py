@@ -11,8 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import Status
+from ..errors import SolveError, Status
+from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
+from .state import State
 
 #: stress relative to the largest one that counts as none
 NO_STRESS = 1e-8
@@ -44,11 +46,31 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation is ill-posed; None where it is nowhere."""
     slack = potential.scene.tension_field
     scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
-    bad = unsupported(evaluation.stress[0], scale, slack)
-    if not bad.any():
-        return None
-    r = potential.space.R.ravel()[bad]
-    return IllPosed(float(r.min()), float(r.max()), slack)
+    r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
+    if slack:
+        r = np.append(r, _folds(potential, evaluation.x, scale))
+    return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
+
+
+def _folds(potential: Potential, x: Array, scale: float) -> Array:
+    """Reference radii where two elements meet at so sharp an angle that a smooth meridian between them would be slack."""
+    space = potential.space
+    s = space.ends[1:-1]
+    (R, _), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
+    u, u_s, _, w_s = space.at_inner_ends(x)
+    stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+    return R[unsupported(stress, scale, True)]
+
+
+def is_slack(potential: Potential, state: State) -> bool:
+    """Whether a state is the end of a tension field."""
+    return potential.scene.tension_field and ill_posed(potential, state.evaluation) is not None
+
+
+def slackness(potential: Potential, state: State, accepted: list[State] | None = None) -> SolveError:
+    """The error that ends a path at a slack state, with the states accepted before and it."""
+    where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
+    return SolveError(f"at {where} {ill_posed(potential, state.evaluation)}", status=Status.SLACK, result=accepted)
 
 
 def unsupported(stress: Array, scale: float, tension_field: bool) -> NDArray[np.bool_]:

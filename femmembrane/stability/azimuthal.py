@@ -35,9 +35,9 @@ from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
 from ..physics.tension_field import natural_strains
-from ..potential import Array, Potential
+from ..potential import Array, Evaluation, Potential
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
-from ..solve.wellposed import unsupported
+from ..solve.wellposed import ill_posed, interval, unsupported
 from ..threads import one_thread
 from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
 from .verdict import Verdict, verdict_from
@@ -503,7 +503,7 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     """
     _check_waves(n, 1)
     operator = azimuthal_operator(potential, x, pressure, n)
-    wrinkles = short_waves(potential, operator)
+    wrinkles = short_waves(potential, operator, potential.evaluate(np.asarray(x, dtype=float), pressure))
     if wrinkles:
         return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
     found = _smallest(operator, guess)
@@ -511,18 +511,19 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     return verdict_from(found, among, None, operator.n, partial(azimuthal_shape, potential.space, operator.n))
 
 
-def short_waves(potential: Potential, operator: AzimuthalOperator) -> str:
+def short_waves(potential: Potential, operator: AzimuthalOperator, evaluation: Evaluation) -> str:
     """Where ever shorter waves have ever lower eigenvalues at this n; empty if nowhere.
 
     A principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails. In a tension field no stress is; there the
     meridional one may vanish, while without hoop stress the operator of one n is as good as any.
     """
-    r, R, relaxed = operator.response, operator.space.R, potential.scene.tension_field
+    if potential.scene.tension_field:
+        return str(ill_posed(potential, evaluation) or "")
+    r, R = operator.response, operator.space.R
     scale = max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
     found = []
     for name, stress, lines in (("meridional", r.s1, "circles"), ("hoop", r.s2, "meridians")):
-        bad = R[unsupported(stress, scale, relaxed)]
-        if bad.size and not (relaxed and name == "hoop"):
-            what = "vanishes" if relaxed else "compressive"
-            found.append(f"{name} stress {what} at r in [{bad.min():.3g}, {bad.max():.3g}]: wrinkles along {lines}")
+        bad = R[unsupported(stress, scale, False)]
+        if bad.size:
+            found.append(f"{name} stress compressive at {interval(bad.min(), bad.max())}: wrinkles along {lines}")
     return "; ".join(found)

@@ -99,7 +99,9 @@ def natural_frequencies(
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(x, pressure)
     bad = ill_posed(potential, evaluation)
-    where = short_waves(potential, operator) if operator.n else str(bad or "")  # a hoop stress sets no axisymmetric wave in motion
+    where = (
+        short_waves(potential, operator, evaluation) if operator.n else str(bad or "")
+    )  # a hoop stress sets no axisymmetric wave in motion
     if where:
         raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=bad.status if bad else Status.LEGENDRE_FAILURE)
     try:

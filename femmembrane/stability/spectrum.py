@@ -67,9 +67,9 @@ def smallest_eigenvalue(
     pencil = Pencil(band, mass, half_bandwidth, constraint, compliance)
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.rayleigh(start)
-    if found is None or pencil.below(found[0]) > 0:
+    if found is None or pencil.below(*found[:2]) > 0:
         found = pencil.lanczos()
-        if pencil.below(found[0]) > 0:
+        if pencil.below(*found[:2]) > 0:
             raise SpectrumError("the eigenvalue found could not be proved to be the smallest")
     value, mode, error = found
     # nothing lies below a positive eigenvalue, so there is nothing negative to count
@@ -86,6 +86,14 @@ class Pencil:
         self.band, self.mass, self.kd, self.constraint, self.compliance = band, mass, kd, constraint, compliance
         self.n = int(band.shape[1])
         self.scale = float(np.abs(band[2 * kd] / mass[2 * kd]).max())
+
+    def noise(self, mode: Array) -> tuple[float, float]:
+        """What cancels in the Rayleigh quotient of a normalised mode and in the size of its residual; times round-off, their noise.
+
+        On a strongly graded mesh both are many decades below the scale, which belongs to waves as short as the smallest element.
+        """
+        forces = band_product(np.abs(self.band), self.kd, np.abs(mode))
+        return float(np.abs(mode) @ forces), float(np.sqrt(np.sum(forces**2 / self.mass[2 * self.kd])))
 
     def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
         factor = BandFactor(self.band - shift * self.mass)
@@ -130,7 +138,7 @@ class Pencil:
             value, error = self.quotient(mode, right)
             # an absolute floor alone would stop too early on a nearly flat membrane, whose modes are decades softer than the scale
             # the error of the value is of second order in that of the mode
-            if error <= 1e-7 * abs(value) or (error <= 1e-14 * self.scale and error > 0.5 * best):
+            if error <= 1e-7 * abs(value) or (error > 0.5 * best and error <= 1e-14 * self.noise(mode)[1]):
                 return value, mode, error
             best = min(best, error)
             mode = self.solve(self.shifted_solver(value), right)
@@ -158,9 +166,10 @@ class Pencil:
         residual = self.projected(force - value * right)
         return value, float(np.sqrt(np.sum(residual**2 / self.mass[2 * self.kd])))
 
-    def below(self, value: float) -> int:
-        """Number of eigenvalues clearly below a value, by inertia."""
-        shift = value - max(_GAP * abs(value), 1e-12 * self.scale)
+    def below(self, value: float, mode: Array) -> int:
+        """Number of eigenvalues clearly below that of a mode, by inertia."""
+        # the flat unloaded disc has no stiffness to cancel: there it takes a shift of any size to tell zero from negative
+        shift = value - max(_GAP * abs(value), 1e-12 * self.noise(mode)[0], 1e-24 * self.scale)
         return self.count(shift)
 
     def count(self, shift: float) -> int:

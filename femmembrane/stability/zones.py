@@ -146,8 +146,8 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
     """The zones of the state x under a pressure, with borders located inside the elements.
 
     Signs are looked at in 13 points of each element and borders found between them as roots: a zone thinner than about a tenth of an
-    element may be missed. From degree 4 on stresses jump at the ends of elements, where they may then also change sign. The cost grows
-    with the number of elements.
+    element may be missed. From degree 4 on stresses jump at the ends of elements, where they may then also change sign. Where a meridian
+    bends sharply within an element its slopes overshoot, and a zone may be a mesh's. The cost grows with the number of elements.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,3 +22,16 @@ def check_ill_posed(ill_posed: Any) -> None:
     """Raise InputError unless what to do in compression is known."""
     if ill_posed not in ILL_POSED:
         raise unknown_name("ill_posed", str(ill_posed), ILL_POSED)
+
+
+def check_increasing(key: str, values: Any, most: int | None = None) -> tuple[int, ...]:
+    """Increasing whole numbers from 1 (to ``most``), or InputError."""
+    allowed = "one or more increasing whole numbers" + (" >= 1 are allowed" if most is None else f" from 1 to {most} are allowed")
+    try:
+        numbers = tuple(values)
+    except TypeError:
+        raise InputError(key, values, allowed) from None
+    whole = all(isinstance(v, (int, np.integer)) and not isinstance(v, bool) and 1 <= v <= (most or np.inf) for v in numbers)
+    if not numbers or not whole or any(b <= a for a, b in pairwise(numbers)):
+        raise InputError(key, values, allowed)
+    return tuple(int(v) for v in numbers)

@@ -21,6 +21,7 @@ from ..solve.search import Limit, beyond_limit
 from ..solve.start import START_VOLUME, flat_state, start_at_height, start_at_pressure, start_at_volume
 from ..solve.state import Path, State
 from ..solve.stepping import Corrector, march
+from ..solve.wellposed import slackness
 from ..threads import one_thread
 from .recording import OnStep, record, resume
 from .trace import trace
@@ -198,6 +199,9 @@ def _follow(
         found.append(new)
         if on_step is not None:
             on_step(index, len(loads), new)
+        if new.status is Status.SLACK and index + 1 < len(loads):
+            status, message = Status.SLACK, f"{control} {loads[index + 1]:.9g} was not reached: {slackness(potential, state)}"
+            break
     branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps))
     if throw and message:
         raise SolveError(f"{message}; {status.advice}", status=status, result=branch)
@@ -259,7 +263,11 @@ class _Walk:
                 states[-1].iterations = sum(s.iterations for s in states)
                 self.state = states[-1]
             except SolveError as error:
+                if error.status is Status.SLACK:
+                    raise
                 turn = self._turn(error, load)
+                if turn.limit.fold is None and turn.limit.slack is not None:
+                    raise slackness(self.potential, turn.limit.slack) from error
                 if not jump or turn.limit.landing is None:
                     raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
                 self.state, self.path = turn.limit.landing, Path()

@@ -60,7 +60,7 @@ def trace(
         Locate limit points, volume folds, height folds and branch points.
     ill_posed : {"stop", "mark"}
         What to do where the meridional stress is compressive, so that the Legendre-Hadamard condition fails and the plain membrane
-        has no mesh-independent equilibria: end there, or go on with that status on every such state.
+        has no mesh-independent equilibria, or where a tension field is slack: end there, or go on with that status on every such state.
     throw : bool
         Raise when the branch ends before ``until`` is met. A branch that ends is a result, so by default it is returned, with the
         reason in its status and message.
@@ -209,10 +209,10 @@ class _Tracing:
         state = resume(potential, start[memory.regular - 1])
         point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1][:-1], float(memory.slopes[-1][-1]))
         # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
-        found = [replace(eq, scene=scene) for eq in start[: memory.regular]]
+        found = [eq.in_scene(scene) for eq in start[: memory.regular]]
         special = None
         if start.special_points is not None:
-            special = [replace(p, equilibrium=replace(p.equilibrium, scene=scene)) for p in start.special_points]
+            special = [replace(p, equilibrium=p.equilibrium.in_scene(scene)) for p in start.special_points]
         return cls(scene, potential, point, tracer, found, special, on_step, max_steps, memory.regular)
 
     def follow(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str]:
@@ -236,6 +236,8 @@ class _Tracing:
     def _step(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str] | None:
         clock = time.perf_counter()
         if self.points is None:
+            if ill_posed == "stop" and (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
+                return end
             self.points = trace_points(self.potential, self.point, self.tracer)
         new = next(self.points)
         self.timings["solve"] += time.perf_counter() - clock
@@ -250,13 +252,19 @@ class _Tracing:
         if last is not None:
             return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
         self.point, self.regular = new, len(self.found)
-        bad = wellposed.ill_posed(self.potential, new.state.evaluation)
-        if bad is not None and ill_posed == "stop":
-            where = f"pole height {self.found[-1].center_height:.4g} (V = {new.state.volume:.6g}, P = {new.state.pressure:.6g})"
-            return bad.status, f"at {where} {bad}, and what a mesh finds beyond depends on the mesh"
+        if ill_posed == "stop" and (end := self._ill_posed(new)) is not None:
+            return end
         if self._contact(new):
             return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
         return None
+
+    def _ill_posed(self, point: BranchPoint) -> tuple[Status, str] | None:
+        bad = wellposed.ill_posed(self.potential, point.state.evaluation)
+        if bad is None:
+            return None
+        height = self.potential.space.center_height(point.state.x)
+        where = f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+        return bad.status, f"at {where} {bad}, and what a mesh finds beyond depends on the mesh"
 
     def add(self, point: BranchPoint, clock: float) -> None:
         solved = time.perf_counter()

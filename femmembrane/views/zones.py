@@ -105,11 +105,8 @@ def draw_along(axes: Axes, line: Array, kind: str, label: str, width: float) -> 
 
 def draw_meridian_zones(axes: Axes, equilibrium: Equilibrium) -> None:
     """The patterns of the wrinkled zones along both halves of a deformed meridian."""
-    for zone in sorted(
-        equilibrium.zones(), key=lambda zone: list(PATTERNS).index(zone.kind)
-    ):  # where bands run into each other, the worst on top
-        if zone.kind == "taut":
-            continue
+    wrinkled = [zone for zone in equilibrium.zones() if zone.kind != "taut"]
+    for zone in sorted(wrinkled, key=lambda zone: list(PATTERNS).index(zone.kind)):  # where bands run into each other, the worst on top
         profile = equilibrium.profile(np.linspace(*zone.s, _POINTS))
         half = np.stack([profile["rho"], profile["eta"]], axis=1)
         mirrored = half * (-1, 1)
@@ -140,8 +137,7 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     """
     from matplotlib.patches import Patch
 
-    x, zones = _with_changes(branch, across)
-    for places, part in _runs(x, zones):
+    for places, part in _runs(*_with_changes(branch, across)):
         edges = np.array([[part[0][0].r[0], *(zone.r[1] for zone in z)] for z in part])
         edges = np.concatenate([edges[:1], edges, edges[-1:]])
         for k, kind in enumerate(part[0].kinds):
@@ -156,15 +152,20 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     ]
 
 
-def _with_changes(branch: Branch, across: Array) -> tuple[Array, list[Zones]]:
-    """The zones of all equilibria and, where the kinds of zones change from one to the next, of states between them; and their places."""
+def _with_changes(branch: Branch, across: Array) -> tuple[Array, list[Zones], set[int]]:
+    """The zones of all equilibria and, where the kinds of zones change from one to the next, of states between them.
+
+    Returns their places, the zones, and the positions of the states that the membrane snapped to.
+    """
     landings = {id(jump.landing) for jump in branch.jumps}
-    shown = [(across[0], branch[0].zones())]
+    shown, snaps = [(across[0], branch[0].zones())], set()
     for k, (a, b) in enumerate(pairwise(branch)):
         between = [] if id(b) in landings else _changing(a, b, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS)
         shown += [(across[k] + t * (across[k + 1] - across[k]), zones) for t, zones in between]
+        if id(b) in landings:
+            snaps.add(len(shown))
         shown.append((across[k + 1], b.zones()))
-    return np.array([x for x, _ in shown]), [zones for _, zones in shown]
+    return np.array([x for x, _ in shown]), [zones for _, zones in shown], snaps
 
 
 def _changing(
@@ -181,11 +182,11 @@ def _changing(
     return [*_changing(a, b, first, middle, halvings - 1), middle, *_changing(a, b, middle, last, halvings - 1)]
 
 
-def _runs(x: Array, zones: Sequence[Zones]) -> Iterator[tuple[Array, list[Zones]]]:
-    """Stretches with the same kinds of zones, and their places with those half-way to what comes before and after."""
+def _runs(x: Array, zones: Sequence[Zones], snaps: set[int]) -> Iterator[tuple[Array, list[Zones]]]:
+    """Stretches with the same kinds of zones and no snap, and their places with those half-way to what comes before and after."""
     half = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
     if x.size == 1:
         half += (-0.5, 0.5)
-    starts = [0, *(k for k in range(1, len(zones)) if zones[k].kinds != zones[k - 1].kinds), len(zones)]
+    starts = [0, *(k for k in range(1, len(zones)) if k in snaps or zones[k].kinds != zones[k - 1].kinds), len(zones)]
     for a, b in pairwise(starts):
         yield np.concatenate([half[a : a + 1], x[a:b], half[b : b + 1]]), list(zones[a:b])

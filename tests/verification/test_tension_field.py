@@ -24,10 +24,10 @@ def wrinkling(dipole: tuple[float, float], elements: int = 64, degree: int = 2, 
 
 
 @cache
-def exact(dipole: tuple[float, float], height: float, relaxed: bool = True) -> Solution:
+def exact(dipole: tuple[float, float], height: float, elements: int = 128) -> Solution:
     """By shooting; the finite elements lend the guess alone."""
-    guess = fm.equilibrium(wrinkling(dipole, 128, relaxed=relaxed), center_height=height)
-    membrane = Membrane(OGDEN.mu, OGDEN.alpha, SUSCEPTIBILITY, *dipole, tension_field=relaxed)
+    guess = fm.equilibrium(wrinkling(dipole, elements), center_height=height)
+    membrane = Membrane(OGDEN.mu, OGDEN.alpha, SUSCEPTIBILITY, *dipole)
     found = solve(membrane, height, float(guess.profile([0.0])["stretch_1"][0]), guess.pressure)
     assert found.miss < 1e-11
     return found
@@ -51,6 +51,28 @@ def test_shooting_agrees_with_the_reference_where_both_speak():
         assert getattr(found, name) == pytest.approx(expected[name], rel=1e-11), name
 
 
+def fitted(elements: int, borders: tuple[float, ...]) -> Disc:
+    """Equal elements, but for the ends nearest to borders, moved onto them."""
+    radii = np.linspace(0.0, 1.0, elements + 1)
+    for border in borders:
+        radii[np.argmin(np.abs(radii - border))] = border
+    return fm.disc(radii=radii)
+
+
+def test_elements_that_end_at_the_borders_give_the_order_back():
+    """Two rounds of zones and mesh; recorded on 2026-11-24: 5.4e-7 and 3.8e-8 with 64 and 128 elements, and uniform 7.1e-7 and 1.7e-7."""
+    expected, errors = exact(ABOVE_ZERO, -0.3), {}
+    for elements, degree in ((64, 2), (128, 2), (32, 4)):
+        uniform = wrinkling(ABOVE_ZERO, elements, degree)
+        eq = first = fm.equilibrium(uniform, center_height=-0.3)
+        for _ in range(2):
+            eq = fm.equilibrium(uniform.replace(mesh=fitted(elements, eq.zones("mechanical").borders)), center_height=-0.3)
+        errors[elements, degree] = abs(eq.pressure / expected.pressure - 1)
+        assert errors[elements, degree] < abs(first.pressure / expected.pressure - 1)
+    assert np.log2(errors[64, 2] / errors[128, 2]) == pytest.approx(4.0, abs=0.4)
+    assert errors[32, 4] < 1e-8
+
+
 @pytest.mark.parametrize("height", [-0.1, -0.2, -0.3, -0.45])
 def test_wrinkled_annulus(height):
     """M = 400, h = -3.75: what the plain membrane leaves out, and the relaxed solution against shooting."""
@@ -67,24 +89,27 @@ def test_wrinkled_annulus(height):
     same = fm.equilibrium(relaxed.scene, volume=plain.volume, start=relaxed)
     assert same.energy < plain.energy
     assert plain.profile()["mechanical_stress_2"].min() < -1e-3
-    assert 1e-5 < abs(same.pressure / plain.pressure - 1) < 1e-2
+    # recorded on 2026-11-24: at the same volume the pressure differs by 0.009 to 0.3 per cent
+    assert 5e-5 < abs(same.pressure / plain.pressure - 1) < 3e-3
 
 
-@pytest.mark.parametrize("height", [0.36, 0.345, 0.33])
-def test_convergence_above_a_slack_circle(height):
-    """M = 600, h = -3.25: borders of zones lie inside elements, so the error falls unevenly, on the whole at order 2.5 or more."""
-    expected, errors = exact(STRONG, height), []
-    for elements in (32, 64, 128, 256, 512):
+@pytest.mark.parametrize(("height", "coarsest", "error"), [(0.36, 32, 3e-7), (0.345, 32, 1e-6), (0.33, 256, 1e-5)])
+def test_convergence_above_a_slack_circle(height, coarsest, error):
+    """M = 600, h = -3.25: borders of zones lie inside elements, so the error falls unevenly, on the whole at order 2 or more."""
+    expected, errors = exact(STRONG, height, elements=512), []
+    meshes = [coarsest * 2**k for k in range(10) if coarsest * 2**k <= 1024]
+    for elements in meshes:
         eq = fm.equilibrium(wrinkling(STRONG, elements), center_height=height)
+        assert eq.status is fm.Status.CONVERGED
         errors.append(max(abs(eq.pressure / expected.pressure - 1), abs(eq.volume / expected.volume - 1)))
-    assert errors[-1] < 1e-6 if height > 0.34 else errors[-1] < 1e-5
-    assert np.polyfit(np.log(2.0) * np.arange(5), np.log(errors), 1)[0] < -1.9
+    assert errors[-1] < error
+    assert -np.polyfit(np.log(meshes), np.log(errors), 1)[0] > 1.9
 
 
 @pytest.mark.parametrize(("height", "error"), [(0.36, 2e-6), (0.345, 5e-6), (0.33, 3e-5)])
 def test_profile_above_a_slack_circle(height, error):
     r = np.linspace(0.05, 0.95, 181)
-    expected, eq = exact(STRONG, height), fm.equilibrium(wrinkling(STRONG, 256), center_height=height)
+    expected, eq = exact(STRONG, height, elements=512), fm.equilibrium(wrinkling(STRONG, 256), center_height=height)
     profile = eq.profile(r)
     rho, eta, f, g = expected.at(r)
     np.testing.assert_allclose(profile["rho"], rho, atol=error)
@@ -96,23 +121,26 @@ def test_profile_above_a_slack_circle(height, error):
     assert not profile["mechanical_stress_2"][wrinkled].any()
 
 
+@pytest.mark.parametrize(("dipole", "height"), [(ABOVE_ZERO, -0.3), ((400.0, -3.25), -0.4), (STRONG, 0.345)])
+def test_jacobi_counts_the_negative_directions_of_wrinkled_states(dipole, height):
+    """An ordinary differential equation beside the eigenvalues of the relaxed second variation, whose coefficients jump at two radii."""
+    eq = fm.equilibrium(wrinkling(dipole), center_height=height)
+    assert 0.05 < eq.zones("mechanical").fraction("radial") < 0.5
+    test = fm.jacobi_test(eq)
+    assert eq.verdict("pressure").negative_directions == len(test.conjugate_points) == 1
+    assert test.conclusion == eq.verdict("pressure").word == "unstable"
+
+
 #: pole height, radius, volume and pressure at which the tension of the meridian vanishes on a circle: by shooting, bisected between
 #: states whose meridian turns one way round there and the other; recorded on 2026-11-24
 FOLD = {"center_height": 0.321102, "r": 0.730974, "volume": 2 * np.pi * 0.0345056, "pressure": 3.383403}
 
 
-@dataclass(frozen=True)
-class Graded(Disc):
-    """Elements that shrink in geometric progression towards a radius from both sides, the smallest ``ratio`` times the largest."""
-
-    at: float = FOLD["r"]
-    ratio: float = 1e-3
-
-    def breakpoints(self) -> np.ndarray:
-        half = self.elements // 2
-        sizes = [np.geomspace(1.0, self.ratio, half), np.geomspace(self.ratio, 1.0, self.elements - half)]
-        inner, outer = (np.append(0.0, np.cumsum(s) / s.sum()) for s in sizes)
-        return np.concatenate([self.at * inner, self.at + (1 - self.at) * outer[1:]])
+def graded(elements: int, ratio: float) -> Disc:
+    """Elements that shrink in geometric progression towards the fold from both sides, the smallest ``ratio`` times the largest."""
+    sizes = np.geomspace(1.0, ratio, elements // 2)
+    inner, outer = (np.append(0.0, np.cumsum(s) / s.sum()) for s in (sizes, sizes[::-1]))
+    return fm.disc(radii=[*FOLD["r"] * inner, *(FOLD["r"] + (1 - FOLD["r"]) * outer[1:-1]), 1.0])
 
 
 def fold_of(mesh: Disc) -> fm.Branch:
@@ -124,7 +152,7 @@ def fold_of(mesh: Disc) -> fm.Branch:
 
 def test_the_branch_ends_at_the_slack_circle():
     """Every mesh says so a little early, from one side, and the closer the finer it is where the membrane folds."""
-    branches = [fold_of(mesh) for mesh in (fm.disc(32), fm.disc(128), fm.disc(512), Graded(128), Graded(256, ratio=1e-4))]
+    branches = [fold_of(mesh) for mesh in (fm.disc(32), fm.disc(128), fm.disc(512), graded(128, 1e-3), graded(256, 1e-4))]
     misses = [branch[-1].center_height - FOLD["center_height"] for branch in branches]
     assert all(a > b > 0 for a, b in pairwise(misses))
     assert misses[0] < 0.025
@@ -139,7 +167,32 @@ def test_the_branch_ends_at_the_slack_circle():
         verdict = branch[-1].verdict("volume")
         assert (verdict.stable, np.isnan(verdict.smallest_eigenvalue)) == (False, True)
         assert "tension vanishes" in verdict.reason
-        assert "meridional stress vanishes" in branch[-1].verdict(azimuthal=1).reason
+        assert "tension vanishes" in branch[-1].verdict(azimuthal=1).reason
+
+
+@pytest.mark.parametrize("elements", [8, 16, 32, 64])
+def test_no_load_leads_past_the_slack_circle(elements):
+    """By volume, by pole height, with either solver, with jumps, from a branch that ended there, or by a search for all equilibria."""
+    scene = wrinkling(STRONG, elements)
+    volumes = [0.4, 0.3, 0.24, 0.21, 0.2]
+    for asked in ({}, {"solver": "newton"}, {"at_limit": "jump"}):
+        run = fm.inflate(scene, volumes=volumes, throw=False, **asked)
+        assert run.status is fm.Status.SLACK
+        assert len(run) < 4
+        assert not run.jumps
+        assert "the meridional tension vanishes at r = 0." in run.message
+        assert all(eq.status is fm.Status.CONVERGED for eq in run[:-1])
+    for height in (0.31, 0.2):
+        with pytest.raises(fm.SolveError, match="tension vanishes") as caught:
+            fm.equilibrium(scene, center_height=height)
+        assert caught.value.status is fm.Status.SLACK
+    ended = fm.trace(scene, start=0.8, direction=-1)
+    again = fm.trace(scene, start=ended)
+    assert (again.status, len(again)) == (fm.Status.SLACK, len(ended))
+    assert not len(fm.equilibria(scene, volume=0.21))
+    for eq in ended[:-1]:  # what is called converged is not called slack
+        assert eq.status is fm.Status.CONVERGED
+    assert eq.center_height > FOLD["center_height"]
 
 
 def test_beyond_the_slack_circle_the_meridian_of_the_model_crosses_itself():

@@ -1,0 +1,232 @@
+"""The same equilibrium on many meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, HEADINGS, PROFILES, ROUND_OFF, Convergence, profile_norms
+from ..errors import InputError, SolveError, Status
+from ..potential import Array, potential_of
+from ..results.records import Equilibrium
+from ..scene import MAX_DEGREE, Scene
+from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
+from ..solve.newton import correct
+from ..solve.state import State
+from ..threads import one_thread
+from .arguments import check_increasing
+from .follow import equilibrium, run
+from .recording import record
+from .trace import trace
+
+_CONTROLS: dict[str, Any] = {"volume": VolumeControl, "pressure": PressureControl, "center_height": CenterHeightControl}
+#: least number of elements of the reference, all of the highest degree
+_REFERENCE_ELEMENTS = 32
+#: a branch is traced from this volume, or half-way to its first limit point, to a little beyond that
+_TRACED_FROM, _TRACED_BEYOND = 0.5, 1.1
+
+
+@one_thread
+def convergence(
+    scene: Scene,
+    *,
+    volume: float | None = None,
+    pressure: float | None = None,
+    center_height: float | None = None,
+    degrees: Sequence[int] = (1, 2, 3, 4),
+    elements: Sequence[int] = (8, 16, 32, 64),
+    start: Equilibrium | None = None,
+    limit_points: bool = False,
+) -> Convergence:
+    """How fast an equilibrium converges with the degree and the number of elements, and how well it is known.
+
+    The equilibrium is the one that :func:`equilibrium` finds on the scene's own mesh, stable or not. From there it is solved on a
+    reference (32 elements of degree 8, or half the most that are asked for) and then on every mesh, all graded like the scene's.
+
+    Parameters
+    ----------
+    scene : Scene
+    volume, pressure, center_height : float
+        Exactly one of them.
+    degrees : sequence of int
+        1 to 8.
+    elements : sequence of int
+        Increasing.
+    start : Equilibrium, optional
+        Of this scene, to start from.
+    limit_points : bool
+        Compare the pressure and volume of the first limit point between V = 0.5 and the equilibrium as well.
+
+    Returns
+    -------
+    Convergence
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter when the equilibrium cannot be found on the scene's own mesh or on the reference; a mesh of the study on which it cannot
+        be found is a line in ``messages`` and NaN in the tables.
+    """
+    degrees = check_increasing("degrees", degrees, MAX_DEGREE)
+    elements = check_increasing("elements", elements, None)
+    if not isinstance(limit_points, bool):
+        raise InputError("limit_points", limit_points, "True or False is allowed")
+    asked = {"volume": volume, "pressure": pressure, "center_height": center_height}
+    given = {name: value for name, value in asked.items() if value is not None}
+    if len(given) != 1:
+        raise InputError("convergence", sorted(given), "exactly one of volume, pressure and center_height is allowed")
+    ((name, load),) = given.items()
+    plain = scene.replace(run=None, analysis=type(scene.analysis)())
+    found = equilibrium(plain, volume=volume, pressure=pressure, center_height=center_height, start=start, solver="newton")
+    control = _CONTROLS[name](float(load))
+    return _Study(plain, name, control, degrees, elements, limit_points).run(scene, float(load), found)
+
+
+@one_thread
+def convergence_of_run(scene: Scene, *, degrees: Sequence[int], elements: Sequence[int]) -> Convergence:
+    """:func:`convergence` at the last load of the scene's [run], with the state that the run ends in.
+
+    Raises
+    ------
+    InputError
+        When the scene has no [run].
+    SolveError
+        When the run does not reach its last load.
+    """
+    degrees, elements = check_increasing("degrees", degrees, MAX_DEGREE), check_increasing("elements", elements, None)
+    plain = scene.replace(analysis=type(scene.analysis)())
+    branch = run(plain)
+    if branch.status is not Status.CONVERGED or plain.run is None:
+        raise SolveError(branch.message or str(branch.status), status=branch.status, result=branch)
+    if plain.run.until is not None:
+        ((name, load),) = plain.run.until.items()
+    else:
+        name, load = {"height": "center_height"}.get(plain.run.control, plain.run.control), float(plain.run.loads()[-1])
+    last = branch[-1]
+    return _Study(last.scene, name, _CONTROLS[name](load), degrees, elements, False).run(scene, load, last)
+
+
+class _Study:
+    """The solves of one study."""
+
+    def __init__(
+        self, scene: Scene, name: str, control: Control, degrees: tuple[int, ...], elements: tuple[int, ...], limit_points: bool
+    ) -> None:
+        self.scene, self.name, self.control, self.degrees, self.elements = scene, name, control, degrees, elements
+        self.traced: tuple[float, float] | None = None
+        self.limit_points = limit_points
+        known = [q for q in HEADINGS if q not in PROFILES and (limit_points or not q.startswith("limit_"))]
+        self.quantities = [q for q in known if q != name and (scene.sources or q != "magnetic_energy")]
+
+    def run(self, scene: Scene, load: float, found: Equilibrium) -> Convergence:
+        n = max(_REFERENCE_ELEMENTS, self.elements[-1] // 2)
+        fine = self.solve(MAX_DEGREE, n, found)
+        others = [self.solve(MAX_DEGREE - 1, n, fine), self.solve(MAX_DEGREE, n // 2, fine)]
+        if self.limit_points:
+            self.traced = self._stretch(fine)
+        reference = self.measured(fine)
+        solved, messages = self._solve_all(fine)
+        shape = (len(self.degrees), len(self.elements))
+        values = {q: np.full(shape, np.nan) for q in self.quantities}
+        errors = {q: np.full(shape, np.nan) for q in (*self.quantities, *PROFILES)}
+        scale, floors = self._floors(fine, others, reference)
+        for place, eq in solved.items():
+            for q, value in self.measured(eq).items():
+                values[q][place] = value
+                errors[q][place] = abs(value - reference[q]) / scale[q]
+            for q, norm in zip(PROFILES, _difference(eq, fine), strict=True):
+                errors[q][place] = norm / scale[q]
+        ordered = {q: errors[q] for q in HEADINGS if q in errors}
+        meshes = [self.scene.mesh.with_elements(n) for n in self.elements]
+        return Convergence(
+            scene=scene,
+            control=self.name,
+            load=load,
+            degrees=self.degrees,
+            elements=self.elements,
+            unknowns=np.array([[potential_of(self.on(d, n)).space.n_free for n in self.elements] for d in self.degrees]),
+            element_size=np.array([np.diff(mesh.breakpoints()).max() for mesh in meshes]),
+            values=MappingProxyType(values),
+            reference=MappingProxyType(reference),
+            errors=MappingProxyType(ordered),
+            floors=MappingProxyType(floors),
+            scale=MappingProxyType(scale),
+            meshes=f"{n} elements of degree {MAX_DEGREE}, against {n} of degree {MAX_DEGREE - 1} and {n // 2} of degree {MAX_DEGREE}",
+            messages=tuple(messages),
+        )
+
+    def on(self, degree: int, elements: int) -> Scene:
+        return self.scene.replace(mesh=self.scene.mesh.with_elements(elements), degree=degree)
+
+    def solve(self, degree: int, elements: int, start: Equilibrium) -> Equilibrium:
+        """The equilibrium on a mesh, from its neighbour on another."""
+        scene = self.on(degree, elements)
+        potential = potential_of(scene)
+        guess = _transferred(start, scene)
+        result = correct(potential, self.control, guess, start.pressure, damped=True, max_iterations=40)
+        if result.status is not Status.CONVERGED:
+            raise SolveError(f"{elements} elements of degree {degree}: the equilibrium was not found there", status=result.status)
+        return record(scene, potential, State.of(result))
+
+    def measured(self, eq: Equilibrium) -> dict[str, float]:
+        limit = self._first_limit(eq) if self.limit_points else {}
+        verdicts = {f"lambda_{c}": eq.verdict(c).smallest_eigenvalue for c in ("pressure", "volume")}
+        found = {**verdicts, **limit}
+        return {q: float(found[q]) if q in found else float(getattr(eq, q)) for q in self.quantities}
+
+    def _solve_all(self, fine: Equilibrium) -> tuple[dict[tuple[int, int], Equilibrium], list[str]]:
+        solved: dict[tuple[int, int], Equilibrium] = {}
+        messages: list[str] = []
+        for i, degree in enumerate(self.degrees):
+            for k, n in enumerate(self.elements):
+                try:
+                    solved[i, k] = self.solve(degree, n, fine)
+                except SolveError as error:
+                    messages.append(f"{error} ({error.status})")
+        return solved, messages
+
+    def _floors(
+        self, fine: Equilibrium, others: Sequence[Equilibrium], reference: dict[str, float]
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """What errors are relative to, and the error of the reference in that measure."""
+        scale: dict[str, float] = {}
+        floors: dict[str, float] = {}
+        measured = [self.measured(eq) for eq in others]
+        for q, value in reference.items():
+            distance = max(abs(m[q] - value) for m in measured)
+            scale[q] = abs(value) if abs(value) > 1e3 * distance else 1.0
+            floors[q] = max(distance / scale[q], EIGENVALUE_ROUND_OFF if q.startswith("lambda") else ROUND_OFF)
+        space = fine.potential.space
+        for q, size, *distances in zip(PROFILES, profile_norms(space, fine.state), *(_difference(eq, fine) for eq in others), strict=True):
+            scale[q], floors[q] = size, max(max(distances) / size, ROUND_OFF)
+        return scale, floors
+
+    def _stretch(self, fine: Equilibrium) -> tuple[float, float] | None:
+        """Volumes between which the first limit point lies on the reference mesh."""
+        if fine.volume <= _TRACED_FROM:
+            return None
+        branch = trace(fine.scene, start=_TRACED_FROM, until={"volume": fine.volume})
+        volumes = [p.volume for p in branch.special_points or () if p.kind == "limit_point"]
+        return (_TRACED_FROM, _TRACED_BEYOND * volumes[0]) if volumes else None
+
+    def _first_limit(self, eq: Equilibrium) -> dict[str, float]:
+        points = []
+        if self.traced is not None:
+            branch = trace(eq.scene, start=self.traced[0], until={"volume": self.traced[1]})
+            points = [p for p in branch.special_points or () if p.kind == "limit_point"]
+        return {f"limit_{q}": getattr(points[0], q) if points else np.nan for q in ("pressure", "volume")}
+
+
+def _difference(eq: Equilibrium, fine: Equilibrium) -> tuple[float, float]:
+    return profile_norms(eq.potential.space, eq.state, fine.potential.space, fine.state)
+
+
+def _transferred(eq: Equilibrium, scene: Scene) -> Array:
+    """The state interpolated on the mesh of another scene."""
+    space = potential_of(scene).space
+    points = space.interpolation_points()
+    u, _, w, _ = eq.potential.space.evaluate(eq.state, points.ravel())
+    return space.interpolate(u.reshape(points.shape), w.reshape(points.shape))

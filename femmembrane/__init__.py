@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .stability.zones import Zones as Zones
     from .verbs import Equilibria as Equilibria
     from .verbs import convergence as convergence
+    from .verbs import cost as cost
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
     from .verbs import fold_curve as fold_curve
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from .verbs import run as run
     from .verbs import trace as trace
     from .verbs import trace_iter as trace_iter
+    from .verbs.cost import Cost as Cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
     from .views.modes import render_mode as render_mode
@@ -72,9 +74,22 @@ _ROOMS = {
     "stability.jacobi": ("jacobi_test", "legendre_test"),
     "stability.verdict": ("Verdict",),
     "stability.zones": ("Zone", "Zones"),
+    "verbs.cost": ("Cost",),
     "verbs.folds": ("Cusp", "FoldCurve"),
     "verbs": (
-        *("Equilibria", "convergence", "equilibria", "equilibrium", "fold_curve", "inflate", "pressurize", "run", "trace", "trace_iter"),
+        *(
+            "Equilibria",
+            "convergence",
+            "cost",
+            "equilibria",
+            "equilibrium",
+            "fold_curve",
+            "inflate",
+            "pressurize",
+            "run",
+            "trace",
+            "trace_iter",
+        ),
     ),
     "views.modes": ("render_mode", "write_mode_vtk"),
 }

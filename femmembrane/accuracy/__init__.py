@@ -1,1 +1,1 @@
-"""How far answers are from those of the continuum, and meshes that keep them as near as is asked for."""
+"""How far answers are from those of the continuum, meshes that keep them near, independent methods, and what accuracy costs."""

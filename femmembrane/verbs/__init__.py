@@ -1,6 +1,7 @@
 """What a user asks for: one verb, one frozen result."""
 
 from .convergence import convergence as convergence
+from .cost import cost as cost
 from .folds import fold_curve as fold_curve
 from .follow import equilibrium as equilibrium
 from .follow import inflate as inflate

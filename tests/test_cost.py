@@ -250,6 +250,11 @@ def test_arguments(given, message):
         study(**given)
 
 
+def test_the_flat_membrane_has_no_step_before_it():
+    with pytest.raises(fm.InputError, match=r"pressure = 0\.0: a load other than 0"):
+        fm.cost(fm.Scene(material=fm.NeoHookean()), pressure=0.0)
+
+
 def test_a_reference_that_is_not_found():
     """A neo-Hookean membrane holds no pressure above its limit point, 1.9 or so: nothing could be measured."""
     with pytest.raises(fm.SolveError, match="no stable equilibrium at P = "):

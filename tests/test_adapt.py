@@ -376,3 +376,8 @@ def test_off_means_off(monkeypatch):
     assert len(fm.inflate(scene, volumes=[1.0, 2.0])) == 2
     assert len(fm.trace(scene, start=1.0, max_steps=2)) == 3
     assert not {"accuracy", "estimated"} & set(scene.to_dict()["mesh"])
+
+
+def test_elements_that_are_not_chosen_are_not_halved():
+    with pytest.raises(fm.InputError, match=r"mesh\.accuracy = 0\.0001: its elements are still to be chosen"):
+        fm.disc(accuracy=1e-4).refined()

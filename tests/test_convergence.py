@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import pickle
 from functools import cache
 
 import numpy as np
@@ -129,6 +130,14 @@ def test_states_under_pressure_and_height_control():
         assert control not in found.quantities
         assert found.reference["volume"] == pytest.approx(point.expected["volume"], rel=1e-9)
         assert found.orders("volume")[0, 1] == pytest.approx(4, abs=0.3)
+
+
+def test_a_study_survives_pickling():
+    """Sent between processes, as a sweep does."""
+    one = fm.convergence(disc_scene(elements=8), volume=1.0, degrees=(1, 2), elements=(4, 8))
+    other = pickle.loads(pickle.dumps(one))
+    assert str(other) == str(one)
+    np.testing.assert_array_equal(other.errors["pressure"], one.errors["pressure"])
 
 
 def test_first_limit_point():

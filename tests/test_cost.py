@@ -231,6 +231,8 @@ def test_a_mesh_that_fails_says_why():
     [
         ({}, "exactly one of volume, pressure and center_height"),
         ({"volume": 1.0, "pressure": 1.0}, "exactly one of volume, pressure and center_height"),
+        ({"volume": 1.0, "degrees": 2}, "degrees = 2: whole numbers from 1 to 8"),
+        ({"volume": 1.0, "solvers": 3}, "solvers = '3'"),
         ({"volume": 1.0, "degrees": (9,)}, "degrees = 9: whole numbers from 1 to 8"),
         ({"volume": 1.0, "elements": (8, 0)}, "elements = 0: whole numbers >= 1"),
         ({"volume": 1.0, "elements": ()}, r"elements = \(\): whole numbers >= 1"),

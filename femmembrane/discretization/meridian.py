@@ -138,6 +138,8 @@ class Disc:
         return np.ones_like(s), np.zeros_like(s)
 
     def refined(self) -> Self:
+        if self.open:
+            raise InputError("mesh.accuracy", self.accuracy, "its elements are still to be chosen; refine the mesh of a branch's scene")
         if self.ratio == 1 and self.radii is None:
             return type(self)(2 * self.elements)
         ends = self.breakpoints()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -150,11 +149,11 @@ class _Study:
             elements=self.elements,
             unknowns=np.array([[potential_of(self.on(d, n)).space.n_free for n in self.elements] for d in self.degrees]),
             element_size=np.array([np.diff(mesh.breakpoints()).max() for mesh in meshes]),
-            values=MappingProxyType(values),
-            reference=MappingProxyType(reference),
-            errors=MappingProxyType(ordered),
-            floors=MappingProxyType(floors),
-            scale=MappingProxyType(scale),
+            values=values,
+            reference=reference,
+            errors=ordered,
+            floors=floors,
+            scale=scale,
             meshes=f"{n} elements of degree {MAX_DEGREE}, against {n} of degree {MAX_DEGREE - 1} and {n // 2} of degree {MAX_DEGREE}",
             messages=tuple(messages),
         )

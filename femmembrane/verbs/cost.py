@@ -7,7 +7,7 @@ import os
 import platform
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
 from os import PathLike
@@ -276,15 +276,16 @@ def _processor() -> str:
 
 
 def _whole(key: str, values: Sequence[int], most: int | None = None) -> None:
-    numbers: list[Any] = [] if isinstance(values, (str, bytes)) else list(values)
+    numbers: list[Any] = list(values) if isinstance(values, Iterable) and not isinstance(values, (str, bytes)) else []
     for n in numbers or [None]:
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1 or (most is not None and n > most):
             raise InputError(key, n if numbers else values, f"whole numbers {'>= 1' if most is None else f'from 1 to {most}'} are allowed")
 
 
 def _known(key: str, names: Sequence[str], known: Any) -> None:
-    for name in [names] if isinstance(names, str) else names:
-        if isinstance(names, str) or name not in known:
+    single = isinstance(names, str) or not isinstance(names, Iterable)
+    for name in [names] if single else names:
+        if single or name not in known:
             raise unknown_name(key, str(name), known)
 
 

@@ -279,9 +279,12 @@ class _Walk:
                 turn = self._turn(error, load)
                 if turn.limit.fold is None and turn.limit.slack is not None:
                     raise slackness(self.potential, turn.limit.slack) from error
-                if not jump or turn.limit.landing is None:
-                    raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
-                self.state, self.path = turn.limit.landing, Path()
+                reached = turn.limit.landing
+                if turn.limit.fold is None and reached is not None:
+                    turn = None  # hard to follow under this control, but by arc length the branch goes there without a turn
+                if reached is None or (turn is not None and not jump):
+                    raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn and turn.limit.fold else error.status) from error
+                self.state, self.path = reached, Path()
         self.load = load
         return self.state, turn
 

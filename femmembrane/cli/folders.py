@@ -1,0 +1,33 @@
+"""What a command reads and where it writes, checked before anything is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+
+def read(path: Path) -> Scene:
+    from ..scene import Scene
+
+    scene = Scene.from_toml(path)
+    if scene.run is None:
+        raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
+    return scene
+
+
+def prepare(out: Path) -> None:
+    """Make the folder and write to it once, before hours are spent on what could not be kept."""
+    import tempfile
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out) as probe:
+            probe.write(b"femmembrane")
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+        raise InputError("--out", str(out), f"cannot be written ({reason}); a folder, there already or to be made, is allowed") from None

@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from .verbs.folds import FoldCurve as FoldCurve
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk
+    from .views.picture import render as render
+    from .views.show import view as view
 
 __version__ = "0.1.0"
 
@@ -92,6 +94,8 @@ _ROOMS = {
         ),
     ),
     "views.modes": ("render_mode", "write_mode_vtk"),
+    "views.picture": ("render",),
+    "views.show": ("view",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -34,7 +34,10 @@ KEPT_IN = {
     "skfem": ("discretization/",),
 }
 #: only inside functions
-HEAVY = ("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "vtk", "vtkmodules", "h5netcdf", "netCDF4", "rich", "tomli_w")
+HEAVY = (
+    *("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "vtk", "vtkmodules"),
+    *("h5netcdf", "netCDF4", "rich", "tomli_w", "PIL", "imageio", "h5py"),
+)
 
 
 def name_of(path: Path) -> str:

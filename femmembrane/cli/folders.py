@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..results.records import Branch
     from ..scene import Scene
 
 
@@ -31,3 +32,13 @@ def prepare(out: Path) -> None:
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
         raise InputError("--out", str(out), f"cannot be written ({reason}); a folder, there already or to be made, is allowed") from None
+
+
+def finished(folder: Path) -> Branch:
+    """The branch that a run left in a folder, or that was saved to a file."""
+    from ..results.store import load
+
+    file = folder / "branch.nc" if folder.is_dir() else folder
+    if not file.is_file():
+        raise InputError("folder", str(folder), "the folder of a run (with its branch.nc) or a saved branch (.nc) is allowed")
+    return load(file)

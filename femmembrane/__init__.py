@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
     from .physics.scales import Scales as Scales
+    from .results.citations import cite as cite
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
     from .results.records import Jump as Jump
@@ -67,6 +68,7 @@ _ROOMS = {
     "physics.magnetics": ("Dipole",),
     "physics.materials": ("NeoHookean", "Ogden"),
     "physics.scales": ("Scales",),
+    "results.citations": ("cite",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),
     "solve.continuation": ("StepControl",),

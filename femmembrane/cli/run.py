@@ -12,13 +12,14 @@ from .folders import prepare, read
 from .interrupts import Interrupts
 from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, count, explain, fail
 from .progress import observer
+from .report import write as write_report
 
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
     from ..scene import Scene
 
 
-def run(scene: Path, /, *, out: Path) -> int:
+def run(scene: Path, /, *, out: Path, report: bool = False) -> int:
     """Compute the equilibria that a scene file asks for and write them to a folder.
 
     Exit codes: 0 done, 2 bad input, 3 not converged, 130 interrupted; with the last two, what was computed is written all the same.
@@ -29,6 +30,8 @@ def run(scene: Path, /, *, out: Path) -> int:
         Scene file (TOML).
     out
         Folder for the results, made when there is none; earlier results in it are replaced.
+    report
+        Write report.html as well, one page about the run.
     """
     asked = read(scene)
     prepare(out)
@@ -38,6 +41,8 @@ def run(scene: Path, /, *, out: Path) -> int:
             raise KeyboardInterrupt
         interrupts.hold = True
         written = _write(branch, out, scene)
+        if report:
+            written.append(write_report(out))
     if interrupts.caught:
         code, message = INTERRUPTED, message if code == INTERRUPTED else "interrupted"
     if code != DONE:
@@ -76,7 +81,9 @@ def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Stat
     from ..results.records import Branch
 
     used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
-    return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message)
+    asked = used.run
+    solver = asked.solver if asked is not None and asked.control in ("volume", "pressure") else "newton"
+    return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver)
 
 
 def _write(branch: Branch, out: Path, scene: Path) -> list[Path]:

@@ -158,6 +158,13 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
     """
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.2), title=branch.scene.title)
+    handles = draw_zones(axes, branch)
+    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
+    return save_figure(figure, path)
+
+
+def draw_zones(axes: Axes, branch: Branch) -> list[Any]:
+    """The zones of a branch on labelled axes, as in :func:`plot_zones`; handles for a legend."""
     volume = np.array([equilibrium.volume for equilibrium in branch])
     steps = np.diff(volume)
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
@@ -165,8 +172,7 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
     axes.set_xlabel(VOLUME_LABEL if monotone else "step")
     axes.set_ylabel("reference radius r/R₀")
     axes.margins(0)
-    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
-    return save_figure(figure, path)
+    return list(handles)
 
 
 # --- frames
@@ -490,7 +496,7 @@ def _draw_sources(axes: Axes, shown: Sequence[Equilibrium]) -> None:
         rho, z = np.array(body.points).T
         middle = float(z.mean())
         if body.moment:
-            tail, tip = (middle + sign * 0.08 * body.moment * box.size for sign in (-1, 1))
+            tail, tip = (middle + sign * 0.11 * body.moment * box.size for sign in (-1, 1))
             arrow = {"arrowstyle": "-|>", "color": _RED, "linewidth": 2.0, "mutation_scale": 14}
             axes.annotate("", xy=(0, tip), xytext=(0, tail), arrowprops=arrow)
             axes.update_datalim([(0, tail), (0, tip)])

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from .verbs.cost import Cost as Cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
+    from .views.export import export as export
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk
     from .views.picture import render as render
@@ -95,6 +96,7 @@ _ROOMS = {
             "trace_iter",
         ),
     ),
+    "views.export": ("export",),
     "views.modes": ("render_mode", "write_mode_vtk"),
     "views.picture": ("render",),
     "views.show": ("view",),

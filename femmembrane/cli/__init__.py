@@ -13,7 +13,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import InputError
-from . import convergence, cost, report, run, view
+from . import convergence, cost, export, report, run, view
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, fail
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "app", "main"]
@@ -27,7 +27,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
-for command in (run.run, convergence.convergence, cost.cost, report.report, view.view):
+for command in (run.run, convergence.convergence, cost.cost, report.report, view.view, export.export):
     app.command(command)
 
 

@@ -16,7 +16,7 @@ from ..results.store import replace_file
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
 from .picture import Surface, aim, check_quantity, draw_key, draw_surface, draw_surroundings, new_plotter
-from .stage import Box
+from .stage import Box, place_of
 
 if TYPE_CHECKING:
     import pyvista
@@ -75,7 +75,7 @@ def view(
     if not branch:
         raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
     check_quantity(color, branch[0].scene, "color")
-    place = _place(step, len(branch))
+    place = place_of(step, len(branch))
     if movie is not None:
         check_movie(movie)
     if screenshot is None and movie is None:
@@ -203,14 +203,6 @@ def _phases(plotter: pyvista.Plotter, surface: ModeSurface) -> Iterator[Frame]:
     for frame in range(_PERIOD):
         draw_moved(plotter, surface, float(np.cos(2 * np.pi * frame / _PERIOD)))
         yield _frame(plotter)
-
-
-def _place(step: int | None, count: int) -> int:
-    if step is None:
-        return count - 1
-    if isinstance(step, bool) or not isinstance(step, (int, np.integer)) or not -count <= step < count:
-        raise InputError("step", step, f"a whole number from {-count} to {count - 1} is allowed: negative ones count from the end")
-    return int(step) % count
 
 
 def _png(path: str | PathLike[str]) -> str | PathLike[str]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..physics.outline import Outline
 
 if TYPE_CHECKING:
@@ -95,6 +96,21 @@ def clamped_ends(equilibrium: Equilibrium, nodes: int = 2) -> list[tuple[int, fl
         for end, held in ends
         if {"u", "w"} <= held and profile["r"][end] > 0
     ]
+
+
+def place_of(step: int | None, count: int) -> int:
+    """Place of a step among so many, negative ones counted from the end; without a step the last.
+
+    Raises
+    ------
+    InputError
+        For a step that is not there.
+    """
+    if step is None:
+        return count - 1
+    if isinstance(step, bool) or not isinstance(step, (int, np.integer)) or not -count <= step < count:
+        raise InputError("step", step, f"a whole number from {-count} to {count - 1} is allowed: negative ones count from the end")
+    return int(step) % count
 
 
 def _cut(body: Outline, box: Box) -> Outline:

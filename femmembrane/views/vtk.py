@@ -12,11 +12,11 @@ A meridian of n nodes is turned about the axis in equal sectors. Points are numb
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..results.store import replace_file
 
 if TYPE_CHECKING:
-    from ..results.records import Branch, Equilibrium
+    from ..results.records import Equilibrium
 
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
@@ -97,7 +97,7 @@ class Revolution:
         return values[self.node]
 
 
-def write_vtk(branch: Branch, path: str | PathLike[str]) -> list[Path]:
+def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[Path]:
     """Write one VTU file an equilibrium and the PVD file that strings them together for ParaView.
 
     The VTU files go to a folder beside ``path``, named like it. Time is the step number; volume and pressure are cell data. When the
@@ -114,7 +114,7 @@ def write_vtk(branch: Branch, path: str | PathLike[str]) -> list[Path]:
     InputError
         When the name does not end in ``.pvd`` or the folder cannot be written to.
     """
-    return write_collection(path, len(branch), lambda step, file: _write_surface(branch[step], smooth_profile(branch[step]), file))
+    return write_collection(path, len(branch), lambda step, file: write_surface(branch[step], smooth_profile(branch[step]), file))
 
 
 def write_collection(path: str | PathLike[str], count: int, write_one: Callable[[int, Path], None]) -> list[Path]:
@@ -164,26 +164,32 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
     return profile
 
 
-def _write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
+def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
+    """Write the surface of one equilibrium as a VTU file."""
     import meshio
 
     revolution = Revolution.of(profile["r"])
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
-    rho, eta = profile["rho"], profile["eta"]
-    R, Z = equilibrium.scene.mesh.position(equilibrium.potential.space.node_parameters())
-    point_data = {"displacement": revolution.vectors(rho - R, eta - Z)}
-    point_data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
-    if equilibrium.scene.analysis.wrinkling:
-        point_data["zone"] = revolution.scalars(equilibrium.zones().numbers(equilibrium.potential.space.node_parameters()).astype(np.int32))
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     mesh = meshio.Mesh(
-        revolution.vectors(rho, eta),
+        revolution.vectors(profile["rho"], profile["eta"]),
         cells,
-        point_data=point_data,
+        point_data=surface_data(equilibrium, profile, revolution),
         cell_data={name: [np.full(len(c), load) for _, c in cells] for name, load in loads.items()},
     )
     with replace_file(file) as temporary:
         mesh.write(temporary, file_format="vtu")
+
+
+def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolution: Revolution) -> dict[str, NDArray[Any]]:
+    """What is known at the points of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
+    parameters = equilibrium.potential.space.node_parameters()
+    R, Z = equilibrium.scene.mesh.position(parameters)
+    data: dict[str, NDArray[Any]] = {"displacement": revolution.vectors(profile["rho"] - R, profile["eta"] - Z)}
+    data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
+    if equilibrium.scene.analysis.wrinkling:
+        data["zone"] = revolution.scalars(equilibrium.zones().numbers(parameters).astype(np.int32))
+    return data
 
 
 def _surface_file(path: Path, step: int) -> Path:

@@ -13,7 +13,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import InputError
-from . import convergence, cost, export, report, run, view
+from . import completion, convergence, cost, export, report, run, scenes, view
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, fail
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "app", "main"]
@@ -27,8 +27,9 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
-for command in (run.run, convergence.convergence, cost.cost, report.report, view.view, export.export):
+for command in (run.run, convergence.convergence, cost.cost, report.report, view.view, export.export, scenes.scenes, scenes.new):
     app.command(command)
+app.command(completion.install_completion, name="--install-completion")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
+from .scenes import bundled
 
 if TYPE_CHECKING:
     from ..results.records import Branch
@@ -13,12 +14,23 @@ if TYPE_CHECKING:
 
 
 def read(path: Path) -> Scene:
+    """The scene of a file, or one that comes with the package, by its name."""
     from ..scene import Scene
 
+    if not path.suffix and not path.exists():
+        path = _bundled(str(path))
     scene = Scene.from_toml(path)
     if scene.run is None:
         raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
     return scene
+
+
+def _bundled(name: str) -> Path:
+    known = bundled()
+    if name not in known:
+        error = unknown_name("scene", name, known)
+        raise InputError("scene", name, f"no such file, and no scene that comes along by this name: {error.allowed}")
+    return known[name]
 
 
 def prepare(out: Path) -> None:

@@ -218,15 +218,9 @@ def test_in_a_browser(tmp_path: Path) -> None:
     """No errors in the console; on a phone and on a screen figures are drawn and nothing hangs over the edge."""
     page = tmp_path / "probe.html"
     page.write_text(PROBE.format(page=escape(page_of(full))), encoding="utf-8")
-    quiet = (
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--disable-gpu",
-        "--disable-dev-shm-usage",
-    )
-    options = ("--headless", "--no-sandbox", *quiet, f"--user-data-dir={tmp_path / 'profile'}", "--enable-logging=stderr", "--dump-dom")
+    quiet = ("--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync")
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", *quiet, f"--user-data-dir={tmp_path / 'profile'}")
+    options += ("--enable-logging=stderr", "--dump-dom")
     done = subprocess.run([str(BROWSER), *options, page.as_uri()], capture_output=True, text=True, timeout=120, check=True)
     assert [line for line in done.stderr.splitlines() if ":CONSOLE" in line] == []
     found = re.search(r'<pre id="found">(.+?)</pre>', done.stdout)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from html import escape
-from itertools import groupby
+from itertools import groupby, pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +20,11 @@ from ..results.store import replace_file
 from ..results.table import estimated
 from . import plots
 from .html import MOST_ROWS, branch_rows, pairs, table, text
+from .stage import Box
 from .style import STYLE
 from .svg import dark, inline_svg, variable
 from .vtk import Array, smooth_profile
+from .zones import new_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -190,9 +192,8 @@ class _Page:
         rows = []
         for name, words, _ in classes:
             for word, steps in _runs(words):
-                first, last = self.branch[steps[0]], self.branch[steps[-1]]
                 span = str(steps[0]) if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
-                rows.append([name, word, span, _span(first.volume, last.volume), _span(first.pressure, last.pressure)])
+                rows.append([name, word, span, *(_span(self.branch.column(c)[steps]) for c in ("volume", "pressure"))])
         figure = self._figure(_eigenvalues(self.branch), "Smallest eigenvalues along the branch")
         listed = table(["against", "verdict", "steps", "V", "P"], rows)
         return f"{_beside(figure, listed)}<h3>The last equilibrium</h3>{pairs((name, reason) for name, _, reason in classes)}"
@@ -211,7 +212,7 @@ class _Page:
         if not names:
             return ""
         found = {name: self.branch.column(f"error_{name}") for name in names}
-        figure = self._figure(_error_curves(found), "Estimated relative errors along the branch")
+        figure = self._figure(_error_curves(self.branch, found), "Estimated relative errors along the branch")
         note = f"Relative errors of the discretisation, at the same {held}, from the same load in a finer space"
         rows = [[name, *_largest(errors)] for name, errors in found.items()]
         return _beside(figure, table(["of", "median", "largest", "there", "without an estimate"], rows, caption=note))
@@ -248,7 +249,8 @@ class _Page:
     def _versions(self) -> str:
         facts = self.facts
         known = [(name, facts[name]) for name in ("command", "written", "platform", "processors") if facts.get(name) is not None]
-        return pairs([*known, *dict(facts.get("versions", {})).items()]) if known or facts.get("versions") else ""
+        versions = dict(facts.get("versions", {}))
+        return f'<div class="scene">{pairs([*known, *versions.items()])}</div>' if known or versions else ""
 
 
 def _beside(*parts: str) -> str:
@@ -284,9 +286,9 @@ def _runs(words: list[str]) -> Iterator[tuple[str, list[int]]]:
         yield word, list(steps)
 
 
-def _span(first: float, last: float) -> str:
-    a, b = f"{first:.5g}", f"{last:.5g}"
-    return (a if a == b else f"{a} → {b}").replace("-", "−")  # noqa: RUF001
+def _span(values: Array) -> str:
+    low, high = f"{values.min():.5g}", f"{values.max():.5g}"
+    return (low if low == high else f"{low} … {high}").replace("-", "−")  # noqa: RUF001
 
 
 def _legend_below(figure: Figure, axes: Any, columns: int = 1) -> None:
@@ -300,7 +302,8 @@ def _profiles(branch: Branch) -> Figure:
     from matplotlib import colormaps
 
     shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, _CURVES).round().astype(int))]
-    figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 1.2))
+    box = Box.of([equilibrium.profile() for equilibrium in shown])
+    figure, axes = plots.new_figure((_WIDTH, 1.9 + _HEIGHT * min(0.85, (box.high - box.low) / (2 * box.radius))))  # round stays round
     for equilibrium, color in zip(shown, colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2))), strict=False):
         label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
         plots.draw_profile(axes, equilibrium, plots.Style(label, "-", color))
@@ -337,14 +340,12 @@ def _eigenvalues(branch: Branch) -> Figure:
     names = [*((f"{c} held", f"lambda_{c}") for c in analysis.stability), *((f"n = {n}", f"lambda_n{n}") for n in analysis.azimuthal_modes)]
     values = {label: branch.column(name) for label, name in names}
     known = np.concatenate([v[np.isfinite(v)] for v in values.values()])
-    dot = "." if len(branch) == 1 else ""
     for k, (label, value) in enumerate(values.items()):
-        axes.plot(value, linestyle=_DASHES[k % 4], color=_COLORS[k % 4], linewidth=1.8, marker=dot, label=f"λ, {label}")
+        _draw_steps(axes, branch, value, k, f"λ, {label}")
     axes.axhline(0, color="0.4", linewidth=0.8, zorder=0)
     usual = float(np.median(np.abs(known))) if known.size else 0.0
     if usual and np.abs(known).max() > 30 * usual:
         axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
-    axes.set_xlabel("step")
     axes.set_ylabel("smallest eigenvalue λ")
     axes.grid(color="0.9", linewidth=0.6)
     _legend_below(figure, axes, columns=2)
@@ -368,14 +369,23 @@ def _zones(branch: Branch) -> Figure:
     return figure
 
 
-def _error_curves(errors: Mapping[str, Any]) -> Figure:
+def _error_curves(branch: Branch, errors: Mapping[str, Array]) -> Figure:
     figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
     for k, (name, value) in enumerate(errors.items()):
-        size = np.where(np.abs(value) > 0, np.abs(value), np.nan)
-        axes.plot(size, linestyle=_DASHES[k], color=_COLORS[k], linewidth=1.8, marker="." if size.size < 40 else "", label=name)
+        _draw_steps(axes, branch, np.where(np.abs(value) > 0, np.abs(value), np.nan), k, name)
     axes.set_yscale("log")
-    axes.set_xlabel("step")
     axes.set_ylabel("estimated relative error")
     axes.grid(color="0.9", linewidth=0.6)
     _legend_below(figure, axes, columns=3)
     return figure
+
+
+def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, label: str) -> None:
+    """A quantity against the step, with a gap where the membrane snaps."""
+    breaks = [0, *(jump.index for jump in branch.jumps), len(branch)]
+    look: dict[str, Any] = {"linestyle": _DASHES[kind % 4], "color": _COLORS[kind % 4], "linewidth": 1.8}
+    for first, last in pairwise(breaks):
+        steps = np.arange(first, last)
+        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, label), **look)
+    axes.set_xlabel("step")
+    axes.xaxis.get_major_locator().set_params(integer=True)

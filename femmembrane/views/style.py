@@ -26,7 +26,7 @@ section { background: var(--paper); border: 1px solid var(--line); border-radius
 .figures > * { min-width: 0; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 420px), 1fr)); gap: 20px; align-items: start; }
 figure { margin: 0; min-width: 0; max-width: 620px; } figure svg { display: block; width: 100%; height: auto; fill: var(--ink); }
-figure + figure { margin-top: 18px; }
+.figures > div > figure + figure { margin-top: 18px; }
 figcaption { color: var(--soft); font-size: .85rem; margin-top: 4px; }
 .scroll { overflow-x: auto; margin: 12px 0; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }

@@ -82,7 +82,7 @@ def _write_mp4(frames: Iterable[Frame], path: Path, rate: float, hold: float) ->
     options: dict[str, Any] = {"fps": rate, "codec": "libx264", "pixelformat": "yuv420p", "quality": 8, "macro_block_size": 2}
     with imageio.get_writer(path, **options) as writer:
         for frame in frames:
-            writer.append_data(frame)
-            last = frame
+            even = frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2]
+            writer.append_data(even)
         for _ in range(round(rate * hold)):
-            writer.append_data(last)
+            writer.append_data(even)

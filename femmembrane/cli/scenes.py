@@ -9,8 +9,8 @@ from pathlib import Path
 from ..errors import InputError
 from .outcome import DONE
 
-#: beside the package in a wheel, and with the demos in a source tree
-_PLACES = (Path(__file__).parents[1] / "scenes", Path(__file__).parents[2] / "demos")
+#: the source tree, if the package is run from one: its scenes are among the demos
+_TREE = Path(__file__).parents[2]
 
 TEMPLATE = """\
 # A scene: what exists and what is asked of it. Lengths are in units of the radius of the rim, stresses in units of the shear
@@ -89,6 +89,11 @@ def new(name: str, /) -> int:
 
 
 def bundled() -> dict[str, Path]:
-    """The scenes that come with the package, by name."""
-    folder = next((place for place in _PLACES if place.is_dir()), None)
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))} if folder else {}
+    """The scenes that come with the package, by name: those of the source tree, or those that were installed with it."""
+    if (_TREE / "pyproject.toml").is_file():
+        found = list((_TREE / "demos").glob("*.toml"))
+    else:
+        from importlib import metadata
+
+        found = [Path(str(file.locate())) for file in metadata.files("femmembrane") or () if file.match("femmembrane/scenes/*.toml")]
+    return {path.stem: path for path in sorted(found, key=lambda path: path.stem)}

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _ENTRIES = {
     "saxena2019": """@article{saxena2019,
-  author  = {Saxena, Prashant and Reddy, Narravula Harshavardhan and Pradhan, Satya Prakash},
+  author  = {Saxena, P. and Reddy, N. H. and Pradhan, S. P.},
   title   = {Magnetoelastic deformation of a circular membrane: wrinkling and limit point instabilities},
   journal = {International Journal of Non-Linear Mechanics},
   volume  = {116},

@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from . import plots
-from .html import branch_rows, equilibrium_pairs, pairs, table
+from .html import branch_rows, equilibrium_pairs, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,32 +16,34 @@ if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
 
 _ROWS = 12
-_SIDE_BY_SIDE = "display:flex;flex-wrap:wrap;gap:24px;align-items:flex-start"
+_SIDE_BY_SIDE = "display:flex;flex-wrap:wrap;gap:24px;align-items:center"
 
 
 def branch_html(branch: Branch) -> str:
-    """A table of at most twelve equilibria beside pressure against volume, and how the branch ended."""
+    """Pressure against volume, a table of at most twelve equilibria, and how the branch ended."""
     if not len(branch):
         return f"<p>No equilibria: {escape(branch.message or str(branch.status))}</p>"
     header, rows = branch_rows(branch, _ROWS)
-    step = f"{len(branch)} equilibria" + (f", {len(rows)} of them shown" if len(rows) < len(branch) else "")
+    count = f"{len(branch)} equilibria" + (f", {len(rows)} of them shown" if len(rows) < len(branch) else "")
     notes = "".join(f"<p>{escape(note)}</p>" for note in (branch.mesh_used, branch.message) if note)
-    shown = table(header, rows, caption=f"{branch.scene.title or 'Branch'}: {step}")
     picture = _picture(plots.plot_pressure_volume(branch), "Pressure against volume")
-    return f'<div style="{_SIDE_BY_SIDE}"><div>{shown}{notes}</div>{picture}</div>'
+    return f'{picture}<div style="overflow-x:auto">{table(header, rows, caption=count)}</div>{notes}'
 
 
 def equilibrium_html(equilibrium: Equilibrium) -> str:
     """Numbers and verdicts beside the deformed meridian."""
-    figure, axes = plots.new_figure((4.2, 3.4))
+    figure, axes = plots.new_figure((4.6, 4.4))
     plots.draw_profile(axes, equilibrium, plots.PLAIN)
     plots.draw_surroundings(axes, [equilibrium])
-    plots.draw_legend(axes)
-    return f'<div style="{_SIDE_BY_SIDE}">{pairs(equilibrium_pairs(equilibrium))}{_picture(figure, "Deformed meridian")}</div>'
+    handles, labels = plots.legend_entries(axes)
+    figure.legend(handles, labels, loc="outside lower left", frameon=False, fontsize=9)
+    known = table(["", ""], equilibrium_pairs(equilibrium))
+    return f'<div style="{_SIDE_BY_SIDE}">{_picture(figure, "Deformed meridian")}{known}</div>'
 
 
 def _picture(figure: Figure, label: str) -> str:
     """A PNG in the page: notebooks put many pages into one, where the ids of SVGs would meet."""
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=110)
-    return f'<img alt="{escape(label)}" style="max-width:100%" src="data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"/>'
+    data = base64.b64encode(file.getvalue()).decode()
+    return f'<img alt="{escape(label)}" style="max-width:min(100%, 560px)" src="data:image/png;base64,{data}"/>'

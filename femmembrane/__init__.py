@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
     from .physics.scales import Scales as Scales
+    from .results.citations import cite as cite
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
     from .results.records import Jump as Jump
@@ -52,8 +53,11 @@ if TYPE_CHECKING:
     from .verbs.cost import Cost as Cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
+    from .views.export import export as export
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk
+    from .views.picture import render as render
+    from .views.show import view as view
 
 __version__ = "0.1.0"
 
@@ -65,6 +69,7 @@ _ROOMS = {
     "physics.magnetics": ("Dipole",),
     "physics.materials": ("NeoHookean", "Ogden"),
     "physics.scales": ("Scales",),
+    "results.citations": ("cite",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),
     "solve.continuation": ("StepControl",),
@@ -91,7 +96,10 @@ _ROOMS = {
             "trace_iter",
         ),
     ),
+    "views.export": ("export",),
     "views.modes": ("render_mode", "write_mode_vtk"),
+    "views.picture": ("render",),
+    "views.show": ("view",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 

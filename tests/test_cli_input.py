@@ -224,6 +224,21 @@ def test_progress_on_a_terminal(stand_in, tmp_path, capsys, monkeypatch):
     assert "P = 1.5" in said.err
 
 
+def test_progress_by_arc_length_promises_no_end(stand_in, tmp_path, capsys, monkeypatch):
+    """How many steps there will be is not known; how far there is to go is."""
+    traced = tmp_path / "traced.toml"
+    scene = Scene.from_toml(DEMO).replace(analysis=type(Scene.from_toml(DEMO).analysis)())
+    scene.replace(run=type(scene.run)(control="arc-length", start=0.5, until={"center_height": 5.2})).to_toml(traced)
+    stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 3)), write=lambda *a, **k: [])
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    assert cli.main(["run", str(traced), "--out", str(tmp_path)]) == cli.DONE
+    said = capsys.readouterr().err
+    assert "step 3, center height 0.5 until 5.2" in said
+    assert "3/60" not in said
+
+
 def test_not_converged_keeps_what_was_computed(stand_in, tmp_path, capsys):
     written = stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 2), Status.STEP_UNDERFLOW, "volume 3 was not reached"))
     assert main(tmp_path) == cli.NOT_CONVERGED

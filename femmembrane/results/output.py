@@ -73,12 +73,13 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
 _ALL = (
     *("branch.csv", "special_points.csv", "zones.csv", "run.json"),
     *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
+    "report.html",  # written from the rest, by whom it is asked for
 )
 
 
 def _names(branch: Branch) -> list[str]:
     """The files that this branch gets, in the order of writing."""
-    absent = set() if len(branch) else {"branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"}
+    absent = {"report.html"} | (set() if len(branch) else {"branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"})
     if not branch.scene.analysis.wrinkling:
         absent |= {"zones.csv", "zones.png"}
     if branch.special_points is None:

@@ -223,6 +223,12 @@ class Equilibrium:
             self._errors[control] = estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
         return self._errors[control]
 
+    def _repr_html_(self) -> str:
+        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        from ..views.notebook import equilibrium_html
+
+        return equilibrium_html(self)
+
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
@@ -306,6 +312,8 @@ class Branch(Sequence[Equilibrium]):
     memory : TraceMemory, or None for a branch that was not traced by arc length
     jumps : tuple of Jump
         Where a run snapped because the branch turned back before a load.
+    solver : str
+        Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     """
 
     scene: Scene
@@ -316,6 +324,7 @@ class Branch(Sequence[Equilibrium]):
     special_points: tuple[SpecialPoint, ...] | None = None
     memory: TraceMemory | None = field(default=None, repr=False)
     jumps: tuple[Jump, ...] = ()
+    solver: str = ""
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -424,6 +433,24 @@ class Branch(Sequence[Equilibrium]):
         from ..views.plots import plot_pressure_volume
 
         return plot_pressure_volume(self, path)
+
+    def report(self, path: str | PathLike[str]) -> None:
+        """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings."""
+        from ..views.report import write_report
+
+        write_report(self, path)
+
+    def cite(self) -> str:
+        """BibTeX of what the computation used."""
+        from .citations import cite
+
+        return cite(self)
+
+    def _repr_html_(self) -> str:
+        """The table and the pressure-volume diagram, for notebooks."""
+        from ..views.notebook import branch_html
+
+        return branch_html(self)
 
 
 def _radii(r: ArrayLike, ends: Array) -> Array:

@@ -340,6 +340,7 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "format": FORMAT,
         "status": branch.status.value,
         "message": branch.message,
+        **({"solver": branch.solver} if branch.solver else {}),
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
         **({"trace_step": branch.memory.step, "trace_regular": branch.memory.regular} if branch.memory is not None else {}),
@@ -380,6 +381,7 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
         timings=json.loads(dataset.attrs["timings"]),
         memory=_memory(dataset),
         jumps=_jumps(dataset, scene, equilibria),
+        solver=str(dataset.attrs.get("solver", "")),  # younger than the format
     )
 
 

@@ -213,7 +213,8 @@ def _follow(
         if new.status is Status.SLACK and index + 1 < len(loads):
             status, message = Status.SLACK, f"{control} {loads[index + 1]:.9g} was not reached: {slackness(potential, state)}"
             break
-    branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps))
+    used = solver if control in _MINIMISED else "newton"
+    branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps), solver=used)
     if throw and message:
         raise SolveError(f"{message}; {status.advice}", status=status, result=branch)
     return branch

@@ -357,4 +357,4 @@ class _Tracing:
         path = self.tracer.path
         memory = TraceMemory(tuple(path.sigma), np.array(path.point), np.array(path.slope), self.tracer.step, self.regular)
         special = None if self.special is None else tuple(self.special)
-        return Branch(self.scene, tuple(self.found), status, message, self.timings, special, memory)
+        return Branch(self.scene, tuple(self.found), status, message, self.timings, special, memory, solver="newton")

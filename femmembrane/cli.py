@@ -1,6 +1,7 @@
 """The command ``femmembrane``: a scene file in, a folder of results out.
 
-Exit codes: 0 done, 2 bad input, 3 not converged (what was computed is written), 130 interrupted (what was computed is written).
+Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
+full disk), 130 interrupted (what was computed is written, and ``--resume`` goes on).
 In a pipe nothing is printed but errors, one line each on stderr. Whatever is slow to import is imported inside the functions: ``--help``
 should answer at once.
 """
@@ -11,7 +12,7 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -24,10 +25,11 @@ from .errors import InputError, SolveError, Status
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
+    from .results.checkpoint import Checkpoints
     from .results.records import Branch, Equilibrium
     from .scene import Scene
 
-DONE, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 130
+DONE, BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, INTERRUPTED = 0, 2, 3, 4, 130
 
 
 app = App(
@@ -60,10 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 @app.command
-def run(scene: Path, /, *, out: Path) -> int:
+def run(scene: Path, /, *, out: Path, resume: bool = False) -> int:
     """Compute the equilibria that a scene file asks for and write them to a folder.
 
-    Exit codes: 0 done, 2 bad input, 3 not converged, 130 interrupted; with the last two, what was computed is written all the same.
+    Now and then the branch so far is saved as checkpoint.nc: --resume goes on from there after an interrupt, a kill or a full disk. One run
+    at a time may write to a folder.
+
+    Exit codes: 0 done, 2 bad input or a folder in use, 3 not converged, 4 results could not be written, 130
+    interrupted; with 3 and 130 what was computed is written all the same, with 4 as much of it as there is room for.
 
     Parameters
     ----------
@@ -71,19 +77,40 @@ def run(scene: Path, /, *, out: Path) -> int:
         Scene file (TOML).
     out
         Folder for the results, made when there is none; earlier results in it are replaced.
+    resume
+        Go on where a run of the same scene in this folder was interrupted; without one, start.
     """
     asked = _read(scene)
     _prepare(out)
-    with _Interrupts() as interrupts:
-        branch, code, message = _compute(asked, interrupts)
+    from .results.checkpoint import Checkpoints, same_scene, unfinished
+    from .results.lock import locked
+    from .results.output import clean
+
+    with locked(out), _Interrupts() as interrupts:
+        clean(out)
+        kept = unfinished(out) if resume else None
+        if kept is not None:
+            same_scene(asked, kept, "--resume")
+        elif resume and (ended := _ended(asked, out)) is not None:
+            return ended
+        checkpoints = Checkpoints(out, kept)
+        branch, code, message = _compute(asked, interrupts, checkpoints)
         if code == INTERRUPTED and not len(branch):  # whatever an earlier run left in the folder is worth more
             raise KeyboardInterrupt
         interrupts.hold = True
-        written = _write(branch, out, scene)
+        try:
+            if code == INTERRUPTED:
+                checkpoints.save()
+            written = _write(branch, out, scene)
+        except (InputError, OSError) as error:
+            return _fail(NOT_WRITTEN, _not_written(error, checkpoints, out))
+        if code != INTERRUPTED:
+            checkpoints.remove()
     if interrupts.caught:
         code, message = INTERRUPTED, message if code == INTERRUPTED else "interrupted"
     if code != DONE:
-        return _fail(code, f"{message.rstrip('.')}. Computed before and kept: {_count(len(branch))}, in {out}")
+        further = "; --resume goes on" if checkpoints.path.exists() else ""
+        return _fail(code, f"{message.rstrip('.')}. Computed before and kept: {_count(len(branch))}, in {out}{further}")
     if sys.stdout.isatty():
         sys.stdout.write(_summary(branch, written))
     return DONE
@@ -93,7 +120,8 @@ def run(scene: Path, /, *, out: Path) -> int:
 def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
     """Solve the last equilibrium that a scene file asks for on many meshes, and write convergence.csv and convergence.png to a folder.
 
-    Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 130 interrupted.
+    Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 4 results
+    could not be written, 130 interrupted.
 
     Parameters
     ----------
@@ -111,9 +139,10 @@ def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements
     asked = _read(scene)
     meshes = {"degrees": _numbers("--degrees", degrees, MAX_DEGREE), "elements": _numbers("--elements", elements)}
     _prepare(out)
+    from .results.lock import locked
     from .verbs.convergence import convergence_of_run
 
-    with _Interrupts() as interrupts:
+    with locked(out), _Interrupts() as interrupts:
         try:
             study = convergence_of_run(asked, **meshes)
         except SolveError as error:
@@ -124,8 +153,8 @@ def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements
         try:
             study.write_csv(written[0])
             study.plot(written[1])
-        except OSError as error:
-            raise InputError("--out", str(out), f"the results could not be written ({error.strerror or error})") from None
+        except (InputError, OSError) as error:
+            return _fail(NOT_WRITTEN, _reason(error, out))
     if study.messages:
         return _fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
     if sys.stdout.isatty():
@@ -137,7 +166,8 @@ def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements
 def cost(scene: Path, /, *, out: Path, quick: bool = False) -> int:
     """Measure error against time of the last equilibrium that a scene file asks for, by every method on every mesh.
 
-    Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 130 interrupted; with the last two nothing is written.
+    Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 4 results could not be written, 130 interrupted;
+    with all but the first nothing is written.
 
     Parameters
     ----------
@@ -150,18 +180,22 @@ def cost(scene: Path, /, *, out: Path, quick: bool = False) -> int:
     """
     asked = _read(scene)
     _prepare(out)
+    from .results.lock import locked
     from .verbs.cost import QUICK, asked_load
     from .verbs.cost import cost as measure
 
-    with _Interrupts() as interrupts:
+    with locked(out), _Interrupts() as interrupts:
         try:
             study = measure(asked, **asked_load(asked) | (dict(QUICK) if quick else {}))
         except SolveError as error:
             return _fail(NOT_CONVERGED, _explain(error.status, str(error)))
         interrupts.check()
         interrupts.hold = True
-        study.write_csv(out / "cost.csv")
-        study.plot(out / "cost.png")
+        try:
+            study.write_csv(out / "cost.csv")
+            study.plot(out / "cost.png")
+        except (InputError, OSError) as error:
+            return _fail(NOT_WRITTEN, _reason(error, out))
     if sys.stdout.isatty():
         sys.stdout.write(f"{study}\n")
     return DONE
@@ -199,11 +233,29 @@ def _prepare(out: Path) -> None:
         raise InputError("--out", str(out), f"cannot be written ({reason}); a folder, there already or to be made, is allowed") from None
 
 
-def _compute(scene: Scene, interrupts: _Interrupts) -> tuple[Branch, int, str]:
+def _ended(scene: Scene, out: Path) -> int | None:
+    """The exit code of the run of this scene that has completed the folder, None if there is none and something is to be computed."""
+    from .results.checkpoint import refuse_others
+    from .results.output import read_record
+
+    facts = read_record(out)
+    if facts is None:
+        return None
+    refuse_others(scene, facts["scene"], "--resume")
+    if facts["status"] == Status.INTERRUPTED:
+        return None
+    message = f"nothing to resume: the run in {out} has ended, with {_count(facts['equilibria'])}"
+    if facts["status"] == Status.CONVERGED:
+        return _fail(DONE, message)
+    return _fail(NOT_CONVERGED, f"{message}. {facts['message']}")
+
+
+def _compute(scene: Scene, interrupts: _Interrupts, checkpoints: Checkpoints) -> tuple[Branch, int, str]:
     """The branch as far as it could be followed, the exit code, and what happened if it is not 0."""
     from .verbs import run as run_scene
 
-    found: list[Equilibrium] = []
+    kept = checkpoints.latest
+    found: list[Equilibrium] = [] if kept is None else list(kept)
     with _progress(scene) as progress:
 
         def on_step(index: int, total: int, equilibrium: Equilibrium) -> None:
@@ -212,7 +264,7 @@ def _compute(scene: Scene, interrupts: _Interrupts) -> tuple[Branch, int, str]:
             progress.step(len(found), total, equilibrium)
 
         try:
-            branch = run_scene(scene, on_step=on_step)
+            branch = run_scene(scene, on_step=on_step, on_checkpoint=checkpoints, unfinished=kept)
             interrupts.check()
         except (KeyboardInterrupt, SolveError) as error:
             if interrupts.caught or not isinstance(error, SolveError):
@@ -236,10 +288,21 @@ def _write(branch: Branch, out: Path, scene: Path) -> list[Path]:
 
     from .results.output import write_run
 
-    try:
-        return write_run(branch, out, command=shlex.join(["femmembrane", "run", str(scene), "--out", str(out)]))
-    except OSError as error:
-        raise InputError("--out", str(out), f"the results could not be written ({error.strerror or error})") from None
+    return write_run(branch, out, command=shlex.join(["femmembrane", "run", str(scene), "--out", str(out)]))
+
+
+def _not_written(error: Exception, checkpoints: Checkpoints, out: Path) -> str:
+    """What is lost and what is not; the branch is saved for --resume, if a file of that size can be written now."""
+    with suppress(InputError, OSError):
+        checkpoints.save()
+    saved = checkpoints.path.exists()
+    advice = f"the computation is kept in {checkpoints.path.name}: make room, and --resume writes the rest" if saved else "make room"
+    return f"{_reason(error, out)}; {advice}"
+
+
+def _reason(error: Exception, out: Path) -> str:
+    text = error.allowed if isinstance(error, InputError) else getattr(error, "strerror", None) or str(error)
+    return f"results could not be written to {out} ({text})"
 
 
 def _explain(status: Status, message: str) -> str:

@@ -93,6 +93,20 @@ class SolveError(FemmembraneError, RuntimeError):
         super().__init__(message)
 
 
+class NotWrittenError(FemmembraneError, OSError):
+    """Results that could not be written: the disk is full, or files may not grow that large.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Names of the files that are missing; the others were written whole.
+    """
+
+    def __init__(self, reason: str, files: Iterable[str]) -> None:
+        self.files = tuple(files)
+        super().__init__(f"{reason}; not written: {', '.join(self.files)}")
+
+
 def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name outside a closed set, with the nearest valid one."""
     known = sorted(known)

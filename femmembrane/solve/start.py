@@ -35,7 +35,7 @@ def spherical_dome(potential: Potential, volume: float) -> Array:
     """
     space = potential.space
     s = space.interpolation_points()
-    height = 2 * np.sinh(np.arcsinh(3 * volume / np.pi) / 3)
+    height = 2 * np.sinh(np.arcsinh(volume * (3 / np.pi)) / 3)
     if height == 0:
         return np.zeros(space.n_free)
     radius = (1 + height**2) / (2 * height)

@@ -259,8 +259,8 @@ def _compute(scene: Scene, interrupts: _Interrupts, checkpoints: Checkpoints) ->
     with _progress(scene) as progress:
 
         def on_step(index: int, total: int, equilibrium: Equilibrium) -> None:
+            interrupts.check()  # what a solver found after it swallowed an interrupt is not what it would have found
             found.append(equilibrium)
-            interrupts.check()
             progress.step(len(found), total, equilibrium)
 
         try:

@@ -94,10 +94,10 @@ def run(scene: Path, /, *, out: Path, resume: bool = False) -> int:
         elif resume and (ended := _ended(asked, out)) is not None:
             return ended
         checkpoints = Checkpoints(out, kept)
+        interrupts.hold = True  # until the next equilibrium: raised inside a compiled solver it is swallowed, with a warning from there
         branch, code, message = _compute(asked, interrupts, checkpoints)
         if code == INTERRUPTED and not len(branch):  # whatever an earlier run left in the folder is worth more
             raise KeyboardInterrupt
-        interrupts.hold = True
         try:
             if code == INTERRUPTED:
                 checkpoints.save()
@@ -329,7 +329,7 @@ class _Interrupts:
     """Ctrl-C that is never lost, and spares the files.
 
     Compiled solvers may swallow the exception that an interrupt raises, so it is also noted, and raised again at the next :meth:`check`.
-    While ``hold`` is set the first interrupt is noted only: the results are written to the end; a second one gets through.
+    While ``hold`` is set the first interrupt is noted only, so that a step or the results are finished; a second one gets through.
     """
 
     def __init__(self) -> None:

@@ -7,16 +7,15 @@ general curve, so a new shape is a new class here and nothing more.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..physics.magnetics import is_number
 
 Array = NDArray[np.float64]
 
@@ -201,12 +200,12 @@ def _check_accuracy(mesh: Disc) -> None:
 
 
 def _positive(key: str, value: Any, least: float, most: float, what: str) -> None:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not least <= value <= most:
+    if not (is_number(value) and least <= float(value) <= most):
         raise InputError(key, value, f"a number from {least:g} to {most:g} is allowed{what}")
 
 
 def _ratio(value: Any) -> float:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 1 / MAX_RATIO <= value <= MAX_RATIO:
+    if not (is_number(value) and 1 / MAX_RATIO <= float(value) <= MAX_RATIO):
         allowed = f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed (size at the rim over size at the pole)"
         raise InputError("mesh.ratio", value, allowed)
     return float(value)
@@ -221,7 +220,7 @@ def _radii(values: Any) -> tuple[float, ...]:
     except TypeError:
         raise InputError("mesh.radii", values, allowed) from None
     for k, end in enumerate(ends):
-        if isinstance(end, (bool, np.bool_)) or not isinstance(end, Real) or not -math.inf < end <= sys.float_info.max:
+        if not is_number(end):
             raise InputError(f"mesh.radii[{k}]", end, "a finite number is allowed")
     if len(ends) < 2 or ends[0] != 0 or ends[-1] != 1:
         raise InputError("mesh.radii", ends, allowed)

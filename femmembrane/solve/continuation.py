@@ -144,9 +144,9 @@ def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> Br
 
 
 def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
-    dual = _dual(potential, tangent)
-    size = np.sqrt(tangent @ dual + tp * tp)
-    return BranchPoint(state, sigma, tangent / size, float(tp / size), dual / size)
+    size = np.sqrt(tangent @ _dual(potential, tangent) + tp * tp)
+    # not the dual over the size, which differs in the last bit: a resumed trace knows the unit tangent alone
+    return oriented_point(potential, state, sigma, tangent / size, float(tp / size))
 
 
 def _dual(potential: Potential, tangent: Array) -> Array:

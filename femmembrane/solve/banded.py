@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -10,6 +11,9 @@ from scipy.linalg import blas, lapack
 from scipy.sparse.linalg import splu
 
 from ..potential import Array
+
+if TYPE_CHECKING:
+    from .._native import Border
 
 
 class BandFactor:
@@ -58,6 +62,17 @@ class BorderedFactor:
         rest = self._factor.solve(f - first * self._column)
         second = (g - self._corner * first - self._row @ rest) / self._delta_w
         return rest - second * self._w, float(first + second)
+
+
+class CompiledBorder:
+    """:class:`BorderedFactor` of the compiled corrector."""
+
+    def __init__(self, border: Border) -> None:
+        self._border = border
+
+    def solve(self, f: Array, g: float) -> tuple[Array, float]:
+        x = np.empty_like(f)
+        return x, self._border.solve(f, g, x)
 
 
 def band_product(band: Array, half_bandwidth: int, x: Array) -> Array:

@@ -12,9 +12,8 @@ OPERATIONS: tuple[str, ...]
 
 @final
 class Factor:
-    def __new__(cls, band: Array, size: int, half_bandwidth: int, general: bool = True) -> Factor: ...
+    def __new__(cls, band: Array, size: int, half_bandwidth: int) -> Factor: ...
     def solve(self, x: Array) -> None: ...
-    def negative(self) -> int: ...
     def determinant_sign(self) -> int: ...
 
 @final
@@ -47,3 +46,18 @@ class Elements:
         gradients: Array,
         densities: Array,
     ) -> tuple[bool, float, float, float, float, int, float, float, float, Border | None]: ...
+
+def inertia(
+    band: Array, mass: Array | None, constraint: Array | None, size: int, half_bandwidth: int, compliance: float, shift: float
+) -> int: ...
+def rayleigh(
+    band: Array,
+    mass: Array,
+    constraint: Array | None,
+    size: int,
+    half_bandwidth: int,
+    compliance: float,
+    mode: Array,
+    iterations: int,
+    gap: float,
+) -> tuple[float, float, int] | None: ...

@@ -8,6 +8,7 @@ round-off.
 
 from __future__ import annotations
 
+import importlib
 import os
 from types import ModuleType
 
@@ -19,10 +20,9 @@ def _load() -> ModuleType | None:
     if os.environ.get(SWITCH, "1") == "0":
         return None
     try:
-        from . import _native
+        return importlib.import_module("femmembrane._native")
     except ImportError:
         return None
-    return _native
 
 
 _module = _load()

@@ -138,9 +138,13 @@ class Potential:
     def _kernel(self) -> _Kernel:
         return _Kernel(self.point_function, self.point_data)
 
-    @cached_property
+    @property
     def elements(self) -> Elements | None:
         """The compiled elements of this potential; None where the compiled half is missing, or lacks an operation of the point function."""
+        return None if native() is None else self._elements
+
+    @cached_property
+    def _elements(self) -> Elements | None:
         module = native()
         tape = None if module is None else record_tape(self.point_function, module.OPERATIONS)
         if module is None or tape is None:
@@ -172,11 +176,12 @@ class Potential:
 
     def assemble_band(self, stiffness_density: Array) -> Array:
         """:meth:`.Space.assemble_band`, compiled where possible."""
-        if self.elements is None:
+        elements = self.elements
+        if elements is None:
             with np.errstate(invalid="ignore"):
                 return self.space.assemble_band(stiffness_density)
         band = np.zeros((self.space.n_free, 3 * self.space.half_bandwidth + 1))
-        self.elements.assemble(stiffness_density, band)
+        elements.assemble(stiffness_density, band)
         return band.T
 
     def _evaluate(self, x: Array, pressure: float, magnetic: float) -> Evaluation:

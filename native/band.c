@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* how much larger than the diagonal entry the terms that make up a pivot may be, and how small beside them the pivot */
+/* how much larger than the diagonal entry the terms that make up a pivot may be, and beside them a pivot with a certain sign */
 #define GROWTH 100.0
 #define SMALLEST 1e-11
 
@@ -29,7 +29,7 @@ static inline void subtract(double *restrict y, double factor, const double *res
 int factor_init(Factor *f, int n, int kd)
 {
     memset(f, 0, sizeof *f);
-    f->n = n, f->kd = kd, f->negative = -1;
+    f->n = n, f->kd = kd;
     f->lower = malloc(sizeof(double) * ((size_t)(kd + 1) * n + 2 * (size_t)n + 1));
     if (f->lower == NULL)
         return -1;
@@ -50,9 +50,9 @@ void band_lower(const double *band, int n, int kd, double *lower)
 }
 
 /*
- * Right-looking. Rounding disturbs the matrix by a few units in the last place of |L| |D| |L|^T, whose diagonal is added up beside the
- * pivots: where it exceeds that of the matrix by little, as for all definite matrices, the factors and the signs of the pivots are those of
- * a matrix next to the given one. Elsewhere, and at a pivot that is rounding itself, the answer is -1.
+ * Right-looking. Rounding disturbs the matrix by a few units in the last place of |L| |D| |L|^T, whose diagonal, the `terms`, is added up
+ * on the way: where it exceeds that of the matrix by little, as for all definite matrices, the factors are those of a matrix next to the
+ * given one. Elsewhere the answer is -1. Pivots that are rounding themselves have uncertain signs.
  */
 int factor_symmetric(Factor *f)
 {
@@ -60,15 +60,15 @@ int factor_symmetric(Factor *f)
     double *terms = f->inverse + n;
     for (int j = 0; j < n; j++)
         terms[j] = f->inverse[j] = fabs(f->lower[(size_t)j * depth]);
-    int negative = 0;
-    f->negative = -1;
+    f->negative = f->uncertain = 0;
     for (int j = 0; j < n; j++) {
         double *column = f->lower + (size_t)j * depth;
         const double pivot = column[0];
         const int m = n - 1 - j < kd ? n - 1 - j : kd;
-        if (!(fabs(pivot) > SMALLEST * terms[j] && terms[j] <= GROWTH * f->inverse[j]))
+        if (!(pivot != 0.0 && terms[j] <= GROWTH * f->inverse[j]))
             return -1;
-        negative += pivot < 0.0;
+        f->negative += pivot < 0.0;
+        f->uncertain += !(fabs(pivot) > SMALLEST * terms[j]);
         const double inverse = f->inverse[j] = 1.0 / pivot;
         for (int k = 1; k <= m; k++) {
             const double l = column[k] * inverse;
@@ -78,7 +78,6 @@ int factor_symmetric(Factor *f)
         for (int k = 1; k <= m; k++)
             column[k] *= inverse;
     }
-    f->negative = negative;
     return 0;
 }
 
@@ -90,7 +89,6 @@ int factor_general(Factor *f, const double *band)
     if (f->lu == NULL || f->swaps == NULL)
         return -1;
     memcpy(f->lu, band, sizeof(double) * (size_t)depth * n);
-    f->negative = -1;
     double largest = 0.0;
     for (size_t k = 0; k < (size_t)depth * n; k++)
         largest = fabs(band[k]) > largest ? fabs(band[k]) : largest;
@@ -123,7 +121,7 @@ int factor_general(Factor *f, const double *band)
 void factor_solve(const Factor *f, double *x)
 {
     const int n = f->n, kd = f->kd;
-    if (f->negative >= 0) {
+    if (f->lu == NULL) {
         for (int j = 0; j < n; j++) {
             const int m = n - 1 - j < kd ? n - 1 - j : kd;
             subtract(x + j + 1, x[j], f->lower + (size_t)j * (kd + 1) + 1, m);
@@ -174,10 +172,10 @@ int border_init(Border *b, int n, int kd)
     memset(b, 0, sizeof *b);
     if (factor_init(&b->factor, n, kd) < 0)
         return -1;
-    b->column = malloc(sizeof(double) * 5 * ((size_t)n + 1));
+    b->column = malloc(sizeof(double) * 4 * ((size_t)n + 1));
     if (b->column == NULL)
         return -1;
-    b->row = b->column + n, b->v = b->row + n, b->w = b->v + n, b->work = b->w + n;
+    b->row = b->column + n, b->v = b->row + n, b->w = b->v + n;
     return 0;
 }
 
@@ -229,14 +227,23 @@ static void factor_dealloc(PyObject *self)
     Py_DECREF(type);
 }
 
-/* Factor(band, kd, general=True): band of shape (n, 3 kd + 1) in C order; ArithmeticError where pivoting is needed and not allowed */
+/* factors of general storage: L D L^T, or L U where needed; -1 without memory */
+int factor_band(Factor *f, const double *band)
+{
+    free(f->lu), free(f->swaps);
+    f->lu = NULL, f->swaps = NULL;
+    band_lower(band, f->n, f->kd, f->lower);
+    return factor_symmetric(f) == 0 ? 0 : factor_general(f, band);
+}
+
+/* Factor(band, n, kd): band of shape (n, 3 kd + 1) in C order */
 static PyObject *factor_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
 {
     PyObject *source;
     Py_buffer band = {0};
-    int n, kd, general = 1;
+    int n, kd;
     (void)kwargs;
-    if (!PyArg_ParseTuple(args, "Oii|p", &source, &n, &kd, &general))
+    if (!PyArg_ParseTuple(args, "Oii", &source, &n, &kd))
         return NULL;
     if (n < 0 || kd < 0) {
         PyErr_SetString(PyExc_ValueError, "no band matrix has these sizes");
@@ -246,20 +253,9 @@ static PyObject *factor_new(PyTypeObject *type, PyObject *args, PyObject *kwargs
         return NULL;
     allocfunc allocate = PyType_GetSlot(type, Py_tp_alloc);
     FactorObject *self = (FactorObject *)allocate(type, 0);
-    if (self != NULL) {
-        Factor *f = &self->factor;
-        int bad = factor_init(f, n, kd);
-        if (!bad) {
-            band_lower(band.buf, n, kd, f->lower);
-            if (factor_symmetric(f) < 0 && general)
-                bad = factor_general(f, band.buf);
-        }
-        if (bad)
-            PyErr_NoMemory();
-        else if (f->negative < 0 && !general)
-            PyErr_SetString(PyExc_ArithmeticError, "the pivots cannot be trusted");
-        if (PyErr_Occurred())
-            Py_CLEAR(self);
+    if (self != NULL && (factor_init(&self->factor, n, kd) < 0 || factor_band(&self->factor, band.buf) < 0)) {
+        Py_CLEAR(self);
+        PyErr_NoMemory();
     }
     PyBuffer_Release(&band);
     return (PyObject *)self;
@@ -284,19 +280,12 @@ static PyObject *factor_solve_method(PyObject *self, PyObject *source)
     Py_RETURN_NONE;
 }
 
-/* number of negative eigenvalues, or -1 after pivoting */
-static PyObject *factor_negative(PyObject *self, PyObject *unused)
-{
-    (void)unused;
-    return PyLong_FromLong(((FactorObject *)self)->factor.negative);
-}
-
 static PyObject *factor_sign(PyObject *self, PyObject *unused)
 {
     const Factor *f = &((FactorObject *)self)->factor;
     int odd = f->negative;
     (void)unused;
-    if (f->negative < 0) {
+    if (f->lu != NULL) {
         odd = 0;
         for (int j = 0; j < f->n; j++)
             odd += (f->swaps[j] != 0) + (f->lu[(size_t)j * (3 * f->kd + 1) + 2 * f->kd] < 0.0);
@@ -305,7 +294,6 @@ static PyObject *factor_sign(PyObject *self, PyObject *unused)
 }
 
 static PyMethodDef factor_methods[] = {{"solve", factor_solve_method, METH_O, NULL},
-                                       {"negative", factor_negative, METH_NOARGS, NULL},
                                        {"determinant_sign", factor_sign, METH_NOARGS, NULL},
                                        {NULL, NULL, 0, NULL}};
 static PyType_Slot factor_slots[] = {
@@ -320,7 +308,7 @@ static void border_dealloc(PyObject *self)
     Py_DECREF(type);
 }
 
-/* solve(f, g, x): y, with the rest of the solution in x; f may be None for zero */
+/* solve(f, g, x): y, with the rest of the solution in x */
 static PyObject *border_solve_method(PyObject *self, PyObject *args)
 {
     const Border *b = &((BorderObject *)self)->border;

@@ -26,7 +26,10 @@ static int add_type(PyObject *module, PyType_Spec *spec, const char *name, PyTyp
     return PyModule_AddObjectRef(module, name, made);
 }
 
-static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "femmembrane._native", NULL, -1, NULL, NULL, NULL, NULL, NULL};
+static PyMethodDef functions[] = {{"inertia", inertia_function, METH_VARARGS, NULL},
+                                  {"rayleigh", rayleigh_function, METH_VARARGS, NULL},
+                                  {NULL, NULL, 0, NULL}};
+static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "femmembrane._native", NULL, -1, functions, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__native(void)
 {

@@ -16,7 +16,7 @@
 #define INDEPENDENT
 #endif
 
-/* ---- buffers ---------------------------------------------------------------------------------------------------------------- */
+/* ---- module.c ---------------------------------------------------------------------------------------------------------------- */
 
 /* A C-contiguous array of doubles (or int64) of a known number of items, or -1 with an exception set. */
 int take_array(PyObject *source, Py_buffer *view, char kind, Py_ssize_t items, int writable, const char *name);
@@ -44,10 +44,10 @@ PyObject *tape_operations(void);
 
 typedef struct {
     int n, kd;
-    int negative;   /* number of negative pivots, or -1 when pivoting was needed */
-    double *lower;  /* unit lower triangle by columns, (kd + 1) n, pivots in the place of its diagonal; NULL when pivoting was needed */
-    double *inverse; /* 1/pivots, n, and their bounds of rounding, n */
-    double *lu;     /* else: LAPACK's general storage, (3 kd + 1) n */
+    int negative, uncertain; /* numbers of negative pivots, and of pivots whose signs are rounding */
+    double *lower;           /* unit lower triangle by columns, (kd + 1) n, with the pivots in the place of its diagonal */
+    double *inverse;         /* 1/pivots, n; then the terms of the pivots, n */
+    double *lu;              /* LAPACK's general storage, (3 kd + 1) n, where pivoting was needed; else NULL */
     int32_t *swaps;
 } Factor;
 
@@ -55,6 +55,7 @@ int factor_init(Factor *f, int n, int kd);
 void factor_free(Factor *f);
 /* L D L^T of f->lower without pivoting; 0, or -1 where its pivots cannot be trusted */
 int factor_symmetric(Factor *f);
+int factor_band(Factor *f, const double *band);
 /* P A = L U of general storage, copied; 0, or -1 without memory */
 int factor_general(Factor *f, const double *band);
 void factor_solve(const Factor *f, double *x);
@@ -63,7 +64,7 @@ void band_product(const double *lower, Py_ssize_t step, int n, int kd, const dou
 
 typedef struct {
     Factor factor;
-    double *column, *row, *v, *w, *work; /* one block, n each */
+    double *column, *row, *v, *w; /* one block, n each */
     double corner, delta_v, delta_w;
 } Border;
 
@@ -72,6 +73,13 @@ void border_free(Border *b);
 void border_set(Border *b, double corner);
 double border_solve(const Border *b, const double *f, double g, double *x);
 double dot(const double *a, const double *b, Py_ssize_t n);
+
+/* ---- spectrum.c ---------------------------------------------------------------------------------------------------------------- */
+
+PyObject *inertia_function(PyObject *module, PyObject *args);
+PyObject *rayleigh_function(PyObject *module, PyObject *args);
+
+/* ---- types ---------------------------------------------------------------------------------------------------------------------- */
 
 extern PyType_Spec factor_spec, border_spec, elements_spec;
 

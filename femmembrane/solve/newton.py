@@ -70,8 +70,9 @@ def correct(
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
         foretold from two corrections in quadratic convergence and confirmed by the residual at x.
     """
-    if not damped and potential.elements is not None:
-        return _compiled(potential.elements, potential, control, x, pressure, magnetic, tolerance, max_iterations)
+    elements = None if damped else potential.elements
+    if elements is not None:
+        return _compiled(elements, potential, control, x, pressure, magnetic, tolerance, max_iterations)
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration = np.inf, 0
     while True:
@@ -189,10 +190,10 @@ def relative_size(potential: Potential, dx: Array, x: Array) -> float:
     largest = 0.0
     for index in potential.space.fields:
         c = float(change[index].max(initial=0.0))  # NaN propagates
+        if not c < np.inf:
+            return np.inf
         if c > 0:
             largest = max(largest, c / max(float(size[index].max()), c))
-        elif c != 0:
-            return np.inf
     return largest
 
 

@@ -8,7 +8,7 @@
     X(NEG, -a) X(TWICE, 2.0 * a) X(SQ, a * a) X(INV, 1.0 / a) X(SQRT, sqrt(a)) X(FABS, fabs(a)) X(EXP, exp(a)) X(LOG, log(a))             \
     X(EXPM1, expm1(a)) X(LOG1P, log1p(a)) X(SIN, sin(a)) X(COS, cos(a)) X(TAN, tan(a)) X(ASIN, asin(a)) X(ACOS, acos(a))                  \
     X(ATAN, atan(a)) X(SINH, sinh(a)) X(COSH, cosh(a)) X(TANH, tanh(a)) X(ASINH, asinh(a)) X(ACOSH, acosh(a)) X(ATANH, atanh(a))          \
-    X(FLOOR, floor(a)) X(CEIL, ceil(a)) X(NOT, (double)(a == 0.0)) X(SIGN, (double)((a > 0.0) - (a < 0.0))) X(ERF, erf(a)) X(ASSIGN, a)
+    X(FLOOR, floor(a)) X(CEIL, ceil(a)) X(NOT, (double)(a == 0.0)) X(SIGN, (a < 0.0 ? -1.0 : a > 0.0 ? 1.0 : a)) X(ERF, erf(a)) X(ASSIGN, a)
 #define BINARY(X)                                                                                                                         \
     X(ADD, a + b) X(SUB, a - b) X(MUL, a * b) X(DIV, a / b) X(POW, pow(a, b)) X(CONSTPOW, pow(a, b)) X(FMIN, fmin(a, b))                  \
     X(FMAX, fmax(a, b)) X(LT, (double)(a < b)) X(LE, (double)(a <= b)) X(EQ, (double)(a == b)) X(NE, (double)(a != b))                    \

@@ -16,6 +16,13 @@
 #define INDEPENDENT
 #endif
 
+/* Compiled twice where the loader can choose, for processors with and without AVX2; without contraction to FMA the results are the same. */
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
+#define EACH_PROCESSOR __attribute__((target_clones("avx2", "default")))
+#else
+#define EACH_PROCESSOR
+#endif
+
 /* ---- module.c ---------------------------------------------------------------------------------------------------------------- */
 
 /* A C-contiguous array of doubles (or int64) of a known number of items, or -1 with an exception set. */

@@ -35,6 +35,40 @@ PyObject *tape_operations(void)
     return list;
 }
 
+/*
+ * expm1 of many points, of which a strain energy is made: 2^k (1 + p) - 1 with p = expm1(r), |r| <= log(2)/2, by its series to r^14. Unlike
+ * the library's it is computed several points at a time; within 2.2 units in the last place (the library 0.9). Arguments beyond +-700 and NaN are the library's.
+ */
+static inline void expm1_many(double *r, const double *x, Py_ssize_t n)
+{
+    const double per_log2 = 1.44269504088896338700, high = 6.93147180369123816490e-01, low = 1.90821492927058770002e-10;
+    const double round = 0x1.8p52; /* added and subtracted: to the nearest whole number, which then stands in the last bits */
+    double beyond = 0.0;
+    for (Py_ssize_t i = 0; i < n; i++)
+        beyond = fabs(x[i]) <= 700.0 ? beyond : 1.0;
+    if (beyond != 0.0) {
+        for (Py_ssize_t i = 0; i < n; i++)
+            r[i] = expm1(x[i]);
+        return;
+    }
+    INDEPENDENT
+    for (Py_ssize_t i = 0; i < n; i++) {
+        const double a = x[i], shifted = a * per_log2 + round, k = shifted - round;
+        const double t = (a - k * high) - k * low, t2 = t * t, t4 = t2 * t2;
+        int64_t bits;
+        double scale;
+        memcpy(&bits, &shifted, 8);
+        bits = (int64_t)((uint64_t)bits << 52) + ((int64_t)1023 << 52);
+        memcpy(&scale, &bits, 8);
+        const double q0 = 1.0 / 2 + t * (1.0 / 6), q1 = 1.0 / 24 + t * (1.0 / 120), q2 = 1.0 / 720 + t * (1.0 / 5040);
+        const double q3 = 1.0 / 40320 + t * (1.0 / 362880), q4 = 1.0 / 3628800 + t * (1.0 / 39916800);
+        const double q5 = 1.0 / 479001600 + t * (1.0 / 6227020800.0) + t2 * (1.0 / 87178291200.0);
+        const double q = (q0 + t2 * q1) + t4 * ((q2 + t2 * q3) + t4 * (q4 + t2 * q5));
+        const double p = t + t2 * q;
+        r[i] = (scale - 1.0) + scale * p;
+    }
+}
+
 static double apply(int code, double a, double b)
 {
 #define CASE(NAME, EXPRESSION)                                                                                                            \
@@ -56,18 +90,23 @@ void tape_scalars(const Tape *tape, double *s)
     }
 }
 
-static void fill(double *r, double value, Py_ssize_t n)
+static inline void fill(double *r, double value, Py_ssize_t n)
 {
     for (Py_ssize_t i = 0; i < n; i++)
         r[i] = value;
 }
 
+EACH_PROCESSOR
 void tape_run(const Tape *tape, const double *scalars, double **registers, Py_ssize_t n)
 {
     for (const Instruction *i = tape->vector, *end = i + tape->n_vector; i != end; i++) {
         double *r = registers[i->target];
         const double *left = i->left < 0 ? &scalars[-1 - i->left] : registers[i->left];
         const double *right = i->right < 0 ? &scalars[-1 - i->right] : registers[i->right];
+        if (i->code == OP_EXPM1 && i->left >= 0) {
+            expm1_many(r, left, n);
+            continue;
+        }
         switch (i->code) {
 #define CASE(NAME, EXPRESSION)                                                                                                            \
     case OP_##NAME:                                                                                                                       \

@@ -244,7 +244,7 @@ def test_every_operation_is_casadis(monkeypatch):
             parameters = np.array([first, second])
             elements.evaluate(right.copy(), parameters, np.empty((2, n)), densities)
             exact = np.array(vectorise(function, n)(left[:, None], np.stack([right, *3 * [np.zeros(n)]]).T, parameters)).T
-            np.testing.assert_allclose(densities, exact[3:], rtol=4e-16, atol=5e-324)
+            np.testing.assert_allclose(densities, exact[3:], rtol=6e-16, atol=5e-324)
     assert space.n_elements == n
 
 

@@ -198,8 +198,13 @@ class Potential:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
         if not self.sources:
             return np.inf
-        space = self.space
-        u, _, w, _ = space.at_quadrature(x).reshape(4, *space.R.shape)
+        space, elements = self.space, self.elements
+        local = np.empty((4, *space.R.shape))
+        if elements is None:
+            local[...] = space.at_quadrature(x).reshape(local.shape)
+        else:
+            elements.at_quadrature(np.ascontiguousarray(x), local)
+        u, _, w, _ = local
         rho, eta, pole = space.R + u, space.Z + w, space.center_height(x)
         return min(math.sqrt(min(s.distance_squared(rho, eta).min(), s.distance_squared(0.0, pole))) for s in self.sources)
 

@@ -212,6 +212,18 @@ double border_solve(const Border *b, const double *f, double g, double *x)
     return first + second;
 }
 
+/* x . A y */
+static double inner(const double *lower, Py_ssize_t step, int n, int kd, const double *x, const double *y)
+{
+    double sum = 0.0;
+    for (int j = 0; j < n; j++) {
+        const double *column = lower + (size_t)j * step;
+        const int m = n - 1 - j < kd ? n - 1 - j : kd;
+        sum += x[j] * (column[0] * y[j] + dot(column + 1, y + j + 1, m)) + y[j] * dot(column + 1, x + j + 1, m);
+    }
+    return sum;
+}
+
 /* ---- Python ------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -291,6 +303,43 @@ static PyObject *factor_sign(PyObject *self, PyObject *unused)
             odd += (f->swaps[j] != 0) + (f->lu[(size_t)j * (3 * f->kd + 1) + 2 * f->kd] < 0.0);
     }
     return PyLong_FromLong(odd % 2 ? -1 : 1);
+}
+
+/* product(band, n, kd, x, y): A x into y, or inner(band, n, kd, x, y): x . A y */
+static PyObject *multiply(PyObject *args, int within)
+{
+    PyObject *source, *left, *right;
+    Py_buffer band = {0}, x = {0}, y = {0};
+    int n, kd;
+    double value = 0.0;
+    if (!PyArg_ParseTuple(args, "OiiOO", &source, &n, &kd, &left, &right))
+        return NULL;
+    if (n < 0 || kd < 0)
+        PyErr_SetString(PyExc_ValueError, "no band matrix has these sizes");
+    else if (take_array(source, &band, 'd', (Py_ssize_t)n * (3 * kd + 1), 0, "band") == 0 && take_array(left, &x, 'd', n, 0, "x") == 0 &&
+             take_array(right, &y, 'd', n, !within, "y") == 0) {
+        const double *lower = (double *)band.buf + 2 * kd;
+        if (within)
+            value = inner(lower, 3 * kd + 1, n, kd, x.buf, y.buf);
+        else
+            band_product(lower, 3 * kd + 1, n, kd, x.buf, y.buf, 0);
+    }
+    PyBuffer_Release(&band), PyBuffer_Release(&x), PyBuffer_Release(&y);
+    if (PyErr_Occurred())
+        return NULL;
+    return within ? PyFloat_FromDouble(value) : Py_NewRef(Py_None);
+}
+
+PyObject *product_function(PyObject *module, PyObject *args)
+{
+    (void)module;
+    return multiply(args, 0);
+}
+
+PyObject *inner_function(PyObject *module, PyObject *args)
+{
+    (void)module;
+    return multiply(args, 1);
 }
 
 static PyMethodDef factor_methods[] = {{"solve", factor_solve_method, METH_O, NULL},

@@ -513,6 +513,25 @@ static PyObject *elements_evaluate(PyObject *self, PyObject *args)
     return bad ? NULL : Py_BuildValue("(ddd)", values[0], values[1], values[2]);
 }
 
+/* at_quadrature(x, out): (u, u_x, w, w_x) at the quadrature points, shape (4, n_points) */
+static PyObject *elements_at_quadrature(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    PyObject *source, *target;
+    Py_buffer x = {0}, out = {0};
+    if (!PyArg_ParseTuple(args, "OO", &source, &target))
+        return NULL;
+    const int bad = take_array(source, &x, 'd', s->n_free, 0, "x") < 0 || take_array(target, &out, 'd', 4 * s->n_points, 1, "out") < 0;
+    for (Py_ssize_t first = 0; !bad && first < s->n_elements; first += s->block) {
+        const Py_ssize_t lanes = s->n_elements - first < s->block ? s->n_elements - first : s->block;
+        interpolate(s, x.buf, first, lanes);
+        for (int r = 0; r < 4 * s->n_quadrature; r++)
+            memcpy((double *)out.buf + r * s->n_elements + first, s->local + r * lanes, sizeof(double) * lanes);
+    }
+    PyBuffer_Release(&x), PyBuffer_Release(&out);
+    return bad ? NULL : Py_NewRef(Py_None);
+}
+
 /* assemble(stiffness, band): the second derivatives into general band storage, shape (n_free, 3 kd + 1) of zeros */
 static PyObject *elements_assemble(PyObject *self, PyObject *args)
 {
@@ -569,7 +588,8 @@ static PyObject *elements_correct(PyObject *self, PyObject *args)
     return answer;
 }
 
-static PyMethodDef elements_methods[] = {{"evaluate", elements_evaluate, METH_VARARGS, NULL},
+static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadrature, METH_VARARGS, NULL},
+                                         {"evaluate", elements_evaluate, METH_VARARGS, NULL},
                                          {"assemble", elements_assemble, METH_VARARGS, NULL},
                                          {"correct", elements_correct, METH_VARARGS, NULL},
                                          {NULL, NULL, 0, NULL}};

@@ -27,6 +27,8 @@ static int add_type(PyObject *module, PyType_Spec *spec, const char *name, PyTyp
 }
 
 static PyMethodDef functions[] = {{"inertia", inertia_function, METH_VARARGS, NULL},
+                                  {"inner", inner_function, METH_VARARGS, NULL},
+                                  {"product", product_function, METH_VARARGS, NULL},
                                   {"rayleigh", rayleigh_function, METH_VARARGS, NULL},
                                   {NULL, NULL, 0, NULL}};
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "femmembrane._native", NULL, -1, functions, NULL, NULL, NULL, NULL};

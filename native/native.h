@@ -80,6 +80,8 @@ void border_free(Border *b);
 void border_set(Border *b, double corner);
 double border_solve(const Border *b, const double *f, double g, double *x);
 double dot(const double *a, const double *b, Py_ssize_t n);
+PyObject *product_function(PyObject *module, PyObject *args);
+PyObject *inner_function(PyObject *module, PyObject *args);
 
 /* ---- spectrum.c ---------------------------------------------------------------------------------------------------------------- */
 

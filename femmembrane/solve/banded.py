@@ -92,7 +92,21 @@ class CompiledBorder:
 
 def band_product(band: Array, half_bandwidth: int, x: Array) -> Array:
     """Symmetric band matrix in LAPACK general storage times a vector."""
-    return blas.dsbmv(half_bandwidth, 1.0, band[half_bandwidth : 2 * half_bandwidth + 1], x)
+    module = native()
+    if module is None:
+        return blas.dsbmv(half_bandwidth, 1.0, band[half_bandwidth : 2 * half_bandwidth + 1], x)
+    y = np.empty(len(x))
+    module.product(np.ascontiguousarray(band.T), len(x), half_bandwidth, np.ascontiguousarray(x), y)
+    return y
+
+
+def band_inner(band: Array, half_bandwidth: int, x: Array, y: Array) -> float:
+    """x . A y with a symmetric band matrix in LAPACK general storage."""
+    module = native()
+    if module is None:
+        with np.errstate(over="ignore", invalid="ignore"):  # a prediction may be absurd; whoever asked sees it by the size
+            return float(x @ band_product(band, half_bandwidth, y))
+    return float(module.inner(np.ascontiguousarray(band.T), len(x), half_bandwidth, np.ascontiguousarray(x), np.ascontiguousarray(y)))
 
 
 def negative_directions(band: Array, half_bandwidth: int, constraint: Array | None = None, compliance: float = 0.0) -> int:

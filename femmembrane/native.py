@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import ModuleType
 
 #: environment variable that switches the compiled half off
@@ -31,3 +33,14 @@ _module = _load()
 def native() -> ModuleType | None:
     """The extension module, or None where the package runs in NumPy alone."""
     return _module
+
+
+@contextmanager
+def in_numpy() -> Iterator[None]:
+    """Leave the compiled half aside for a while, to compare; all threads of the process see it."""
+    global _module
+    before, _module = _module, None
+    try:
+        yield
+    finally:
+        _module = before

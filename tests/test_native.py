@@ -43,16 +43,9 @@ SHAPES = {
 }
 
 
-@pytest.fixture
-def in_numpy(monkeypatch):
-    """Run a function without the compiled half."""
-
-    def run(function, *args, **kwargs):
-        with monkeypatch.context() as patch:
-            patch.setattr(switch, "_module", None)
-            return function(*args, **kwargs)
-
-    return run
+def in_numpy(function, *args, **kwargs):
+    with switch.in_numpy():
+        return function(*args, **kwargs)
 
 
 def dome(potential: Potential, height: float = 0.7) -> np.ndarray:
@@ -67,7 +60,7 @@ def close(a, b, rtol=1e-12):
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_evaluation_and_assembly(name, in_numpy):
+def test_evaluation_and_assembly(name):
     potential = potential_of(SHAPES[name])
     assert potential.elements is not None
     for height in (0.7, 1e-4, -0.3):
@@ -104,7 +97,7 @@ def same_result(found, expected):
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
-def test_corrector_over_the_registry(problem, in_numpy):
+def test_corrector_over_the_registry(problem):
     """From 1 % off in volume and from the state itself: the same iterates."""
     potential = potential_of(problem.point.scene)
     there = problem.solve("newton")
@@ -115,7 +108,7 @@ def test_corrector_over_the_registry(problem, in_numpy):
 
 
 @pytest.mark.parametrize("name", ["volume", "pressure", "height", "gas", "arc length"])
-def test_corrector_under_every_control(name, in_numpy):
+def test_corrector_under_every_control(name):
     potential = potential_of(SHAPES["degree 6"])
     there = fm.equilibrium(SHAPES["degree 6"], volume=5.0, solver="newton")
     dual = np.linspace(-1, 1, len(there.state))
@@ -133,7 +126,7 @@ def test_corrector_under_every_control(name, in_numpy):
 
 
 @pytest.mark.parametrize("guess", ["far", "nan", "huge", "outside the energy"])
-def test_corrector_fails_alike(guess, in_numpy):
+def test_corrector_fails_alike(guess):
     potential = potential_of(SHAPES["degree 6"])
     rng = np.random.default_rng(0)
     n = potential.space.n_free
@@ -149,7 +142,7 @@ def test_corrector_fails_alike(guess, in_numpy):
 
 
 @pytest.mark.parametrize("name", ["degree 6", "tension field"])
-def test_traces_and_verdicts(name, in_numpy):
+def test_traces_and_verdicts(name):
     """Whole branches with limit points and verdicts, from one code and the other."""
     scene = SHAPES[name].replace(analysis=fm.Analysis(stability=("pressure", "volume")))
     kwargs = {"start": 0.35, "until": {"volume": 40.0}, "max_steps": 60}
@@ -165,7 +158,7 @@ def test_traces_and_verdicts(name, in_numpy):
     ]
 
 
-def test_factors_where_pivoting_is_needed(in_numpy):
+def test_factors_where_pivoting_is_needed():
     """Random matrices without a dominant diagonal: L D L^T alone would lose all digits in some of them."""
     n, kd = 60, 4
     for seed in range(60):
@@ -218,7 +211,7 @@ BINARY = {
 }
 
 
-def test_every_operation_is_casadis(monkeypatch):
+def test_every_operation_is_casadis():
     """On ordinary and extreme arguments, operands constant, shared or given for each point."""
     points = np.array([-1e300, -750.0, -40.0, -1.5, -0.4, -1e-9, 0.0, 1e-300, 1e-9, 0.3, 0.9, 1.0, 1.7, 30.0, 710.0, 1e300, np.inf, np.nan])
     left, right = (m.ravel() for m in np.meshgrid(points, points))
@@ -254,6 +247,9 @@ def test_an_unknown_operation_leaves_the_scene_to_numpy():
 
 
 def test_the_switch():
+    with switch.in_numpy():
+        assert switch.native() is potential_of(SHAPES["linear"]).elements is None
+    assert switch.native() is not None
     code = "import femmembrane.native as n; print(n.native() is None)"
     for value, off in (("0", True), ("1", False)):
         found = subprocess.run(

@@ -24,7 +24,7 @@ class Border:
 class Elements:
     def __new__(
         cls,
-        tape: tuple[Indices, Indices, Array, int, int, int, int],
+        tape: tuple[Indices, Indices, Array, int, int, int, int, int],
         data: Array,
         gather: Indices,
         table: Array,

@@ -386,7 +386,7 @@ def vectorise(function: ca.Function, n: int) -> ca.Function:
 
 def record_tape(
     function: ca.Function, operations: Sequence[str]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, int, int, int, int] | None:
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, int, int, int, int, int] | None:
     """The instructions of a scalar function for the compiled half; None when one of them is none of its operations.
 
     Inputs and output are those of :func:`vectorise`. What depends on constants and on the last input alone is a scalar, numbered -1, -2,
@@ -397,7 +397,7 @@ def record_tape(
     -------
     scalar, vector : ndarray of int, shape (n, 4)
     constants : ndarray
-    n_scalars, n_inputs, n_registers, n_outputs : int
+    n_parameters, n_scalars, n_inputs, n_registers, n_outputs : int
     """
     codes = {getattr(ca, f"OP_{name}"): code for code, name in enumerate(operations)}
     instructions = [
@@ -429,7 +429,8 @@ def record_tape(
         else:
             return None
     scalar, vector = (np.array(entries, dtype=np.int64).reshape(-1, 4) for entries in lists)
-    return scalar, vector, np.array(constants), n_scalars, n_inputs, first_work + function.sz_w(), function.numel_out(0)
+    sizes = function.numel_in(last), n_scalars, n_inputs, first_work + function.sz_w(), function.numel_out(0)
+    return scalar, vector, np.array(constants), *sizes
 
 
 def potential_of(scene: Scene) -> Potential:

@@ -483,7 +483,7 @@ static PyObject *elements_new(PyTypeObject *type, PyObject *args, PyObject *kwar
         s->n_data = (int)s->tape.n_inputs - 4;
         bad = take_array(data, &d, 'd', s->n_data * s->n_points, 0, "data") < 0 ||
               take_array(table, &t, 'd', (Py_ssize_t)8 * nq * nl, 0, "table") < 0;
-        if (!bad && (s->tape.n_outputs != N_ROWS || s->n_data < 0 || s->tape.n_scalars < s->tape.n_constants + 2)) {
+        if (!bad && (s->tape.n_outputs != N_ROWS || s->n_data < 0 || s->tape.n_parameters != 2)) {
             PyErr_SetString(PyExc_ValueError, "the tape is not that of a potential");
             bad = 1;
         }

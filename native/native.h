@@ -35,7 +35,7 @@ typedef struct {
 } Instruction;
 
 typedef struct {
-    Py_ssize_t n_scalar, n_vector, n_constants, n_scalars, n_inputs, n_registers, n_outputs;
+    Py_ssize_t n_scalar, n_vector, n_constants, n_parameters, n_scalars, n_inputs, n_registers, n_outputs;
     Instruction *scalar; /* on constants and parameters: once a call */
     Instruction *vector;
     double *constants; /* the first of the scalars, before the parameters */

@@ -162,7 +162,7 @@ static int check(const Tape *t, const Instruction *list, Py_ssize_t count, int s
         int bad = i.code < 0 || i.code >= N_OPERATIONS;
         bad |= i.left < low || i.left >= high || i.right < low || i.right >= high || i.target < low || i.target >= high;
         bad |= scalar ? i.target >= 0 || i.left >= 0 || i.right >= 0 : i.target < (int32_t)t->n_inputs;
-        bad |= scalar && i.target > -1 - (int32_t)t->n_constants;
+        bad |= scalar && i.target > -1 - (int32_t)(t->n_constants + t->n_parameters);
         if (bad) {
             PyErr_SetString(PyExc_ValueError, "an instruction of the tape has no meaning");
             return -1;
@@ -171,13 +171,13 @@ static int check(const Tape *t, const Instruction *list, Py_ssize_t count, int s
     return 0;
 }
 
-/* (scalar instructions, vector instructions, constants, number of scalars, inputs, registers and outputs) */
+/* (scalar instructions, vector instructions, constants, numbers of parameters, scalars, inputs, registers and outputs) */
 int tape_init(Tape *t, PyObject *description)
 {
     PyObject *scalar, *vector, *constants;
     Py_buffer s = {0}, v = {0}, c = {0};
     int result = -1;
-    if (!PyArg_ParseTuple(description, "OOOnnnn", &scalar, &vector, &constants, &t->n_scalars, &t->n_inputs, &t->n_registers, &t->n_outputs))
+    if (!PyArg_ParseTuple(description, "OOOnnnnn", &scalar, &vector, &constants, &t->n_parameters, &t->n_scalars, &t->n_inputs, &t->n_registers, &t->n_outputs))
         return -1;
     if (take_array(scalar, &s, 'l', -1, 0, "scalar") == 0 && take_array(vector, &v, 'l', -1, 0, "vector") == 0 &&
         take_array(constants, &c, 'd', -1, 0, "constants") == 0) {
@@ -195,7 +195,7 @@ int tape_init(Tape *t, PyObject *description)
             for (Py_ssize_t k = 0; k < 4 * t->n_vector; k++)
                 numbers[4 * t->n_scalar + k] = (int32_t)((const int64_t *)v.buf)[k];
             result = check(t, t->scalar, t->n_scalar, 1) | check(t, t->vector, t->n_vector, 0);
-            if (t->n_scalars < t->n_constants || t->n_registers < t->n_inputs + t->n_outputs) {
+            if (t->n_scalars < t->n_constants + t->n_parameters || t->n_registers < t->n_inputs + t->n_outputs) {
                 PyErr_SetString(PyExc_ValueError, "the tape has too few registers");
                 result = -1;
             }

@@ -40,19 +40,19 @@ if TYPE_CHECKING:
     from .stability.zones import Zone as Zone
     from .stability.zones import Zones as Zones
     from .verbs import Equilibria as Equilibria
-    from .verbs import convergence as convergence
-    from .verbs import cost as cost
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
     from .verbs import fold_curve as fold_curve
     from .verbs import inflate as inflate
     from .verbs import pressurize as pressurize
     from .verbs import run as run
-    from .verbs import trace as trace
     from .verbs import trace_iter as trace_iter
+    from .verbs.convergence import convergence as convergence
     from .verbs.cost import Cost as Cost
+    from .verbs.cost import cost as cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
+    from .verbs.trace import trace as trace
     from .views.export import export as export
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, NotWrittenError
+from ..native import native
 from .store import package_version, replace_file, save
 from .table import write_csv, write_special_points_csv, write_zones_csv
 
@@ -158,6 +159,7 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
         "equilibria": len(branch),
         "special_points": None if branch.special_points is None else len(branch.special_points),
         "timings": {stage: float(seconds) for stage, seconds in branch.timings.items()},
+        "compiled": native() is not None if not len(branch) else branch[0].potential.elements is not None,
         "versions": {"python": platform.python_version(), **{name: package_version(name) for name in NOTED_VERSIONS}},
         "platform": platform.platform(),
         "processors": os.cpu_count(),

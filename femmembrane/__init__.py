@@ -18,10 +18,17 @@ if TYPE_CHECKING:
     from .errors import InputError as InputError
     from .errors import SolveError as SolveError
     from .errors import Status as Status
+    from .physics.invariant import ArrudaBoyce as ArrudaBoyce
+    from .physics.invariant import Fung as Fung
+    from .physics.invariant import Gent as Gent
+    from .physics.invariant import Yeoh as Yeoh
     from .physics.magnetics import Dipole as Dipole
+    from .physics.materials import MooneyRivlin as MooneyRivlin
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
+    from .physics.materials import Varga as Varga
     from .physics.scales import Scales as Scales
+    from .potential import StrainEnergy as StrainEnergy
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
     from .results.records import Jump as Jump
@@ -62,9 +69,11 @@ _ROOMS = {
     "accuracy.error_estimate": ("Deviation", "ErrorEstimate"),
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
+    "physics.invariant": ("ArrudaBoyce", "Fung", "Gent", "Yeoh"),
     "physics.magnetics": ("Dipole",),
-    "physics.materials": ("NeoHookean", "Ogden"),
+    "physics.materials": ("MooneyRivlin", "NeoHookean", "Ogden", "Varga"),
     "physics.scales": ("Scales",),
+    "potential": ("StrainEnergy",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),
     "solve.continuation": ("StepControl",),

@@ -34,11 +34,21 @@ from numpy.typing import NDArray
 
 from .discretization.meridian import Disc, Meridian, disc
 from .errors import InputError, unknown_name
+from .physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
 from .physics.magnetics import Dipole, Source
-from .physics.materials import Material, NeoHookean, Ogden
+from .physics.materials import Material, MooneyRivlin, NeoHookean, Ogden, Varga
 from .physics.scales import AGREEMENT, Scales
 
-MATERIALS: dict[str, Any] = {"neo-hookean": NeoHookean, "ogden": Ogden}
+MATERIALS: dict[str, Any] = {
+    "arruda-boyce": ArrudaBoyce,
+    "fung": Fung,
+    "gent": Gent,
+    "mooney-rivlin": MooneyRivlin,
+    "neo-hookean": NeoHookean,
+    "ogden": Ogden,
+    "varga": Varga,
+    "yeoh": Yeoh,
+}
 SOURCES: dict[str, Any] = {"dipole": Dipole}
 SHAPES: dict[str, Any] = {"disc": Disc}
 CONTROLS = ("volume", "pressure", "height", "arc-length")

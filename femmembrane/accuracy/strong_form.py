@@ -25,7 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import Disc
 from ..errors import InputError
-from ..physics.magnetics import is_number, magnetic_energy_density
+from ..physics.checks import is_number
+from ..physics.magnetics import magnetic_energy_density
 from ..scene import Scene
 
 Array = NDArray[np.float64]

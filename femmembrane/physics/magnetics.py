@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Protocol
 
 from ..errors import InputError
+from .checks import is_number
 
 
 class Source(Protocol):
@@ -96,11 +96,3 @@ def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rh
         return -susceptibility / 2 * sources[0].intensity(rho, eta)
     h_rho, h_z = magnetic_field(sources, rho, eta)
     return -susceptibility / 2 * (h_rho**2 + h_z**2)
-
-
-def is_number(value: object) -> bool:
-    """Whether a value is a finite number, NumPy's included; truth values are none."""
-    try:
-        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(float(value))
-    except OverflowError:  # a whole number that no float can hold
-        return False

@@ -26,6 +26,8 @@ START_VOLUME = 0.5
 NEAR = 0.2
 #: from this volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
 SAFE_VOLUME = 10.0
+#: up to this volume every membrane is a dome to which linear elasticity applies: a dome that fails there is not tried smaller
+SMALL_VOLUME = 0.05
 
 
 def spherical_dome(potential: Potential, volume: float) -> Array:
@@ -89,9 +91,10 @@ def _inflated(potential: Potential, volume: float) -> State:
     bad = ill_posed(potential, result.evaluation)
     if bad is not None and bad.slack:
         raise SolveError(f"no tension holds a dome of volume {volume:.6g}: {bad}", status=Status.SLACK)
-    if abs(volume) <= SAFE_VOLUME:
+    if abs(volume) <= SMALL_VOLUME:
         raise SolveError(f"no dome of volume {volume:.6g} could be inflated; {result.status.advice}", status=result.status)
-    first = np.copysign(SAFE_VOLUME, volume)
+    # a dome may be far from the equilibrium, or, where a material locks, outside the domain of its energy
+    first = np.copysign(SAFE_VOLUME if abs(volume) > SAFE_VOLUME else abs(volume) / 4, volume)
     return march(potential, _inflated(potential, first), VolumeControl, first, volume, magnetic=0.0)[-1]
 
 

@@ -23,11 +23,17 @@ if TYPE_CHECKING:
     from .physics.invariant import Gent as Gent
     from .physics.invariant import Yeoh as Yeoh
     from .physics.magnetics import Dipole as Dipole
+    from .physics.magnetics import Source as Source
     from .physics.materials import MooneyRivlin as MooneyRivlin
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
     from .physics.materials import Varga as Varga
     from .physics.scales import Scales as Scales
+    from .physics.sources import Loop as Loop
+    from .physics.sources import Solenoid as Solenoid
+    from .physics.sources import Uniform as Uniform
+    from .physics.sources import Wire as Wire
+    from .physics.tabulated import Tabulated as Tabulated
     from .potential import StrainEnergy as StrainEnergy
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
@@ -70,9 +76,11 @@ _ROOMS = {
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.invariant": ("ArrudaBoyce", "Fung", "Gent", "Yeoh"),
-    "physics.magnetics": ("Dipole",),
+    "physics.magnetics": ("Dipole", "Source"),
     "physics.materials": ("MooneyRivlin", "NeoHookean", "Ogden", "Varga"),
     "physics.scales": ("Scales",),
+    "physics.sources": ("Loop", "Solenoid", "Uniform", "Wire"),
+    "physics.tabulated": ("Tabulated",),
     "potential": ("StrainEnergy",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),

@@ -26,7 +26,7 @@ from .discretization.space import HESSIAN_PAIRS, Space, space_of
 from .errors import InputError
 from .physics.kinematics import hencky_strains
 from .physics.loads import volume_density
-from .physics.magnetics import Source, magnetic_energy_density
+from .physics.magnetics import Source, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
@@ -154,13 +154,34 @@ class Potential:
             return np.inf
         space = self.space
         u, _, w, _ = space.at_quadrature(x).reshape(4, *space.R.shape)
-        rho, eta, pole = space.R + u, space.Z + w, space.center_height(x)
-        return min(math.sqrt(min(s.distance_squared(rho, eta).min(), s.distance_squared(0.0, pole))) for s in self.sources)
+        rho, eta = space.R + u, space.Z + w
+        found = min(math.sqrt(s.distance_squared(rho, eta).min()) for s in self.sources)
+        if not self._pole:
+            return found
+        pole = space.center_height(x)
+        return min(found, *(math.sqrt(s.distance_squared(0.0, pole)) for s in self.sources))
 
     def passed_source(self, before: Array, after: Array) -> bool:
-        """Whether the pole went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
+        """Whether the membrane went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
         heights = self.space.center_height(before), self.space.center_height(after)
-        return any(source.passed(*heights) for source in self.sources)
+        if self._pole and any(source.passed(*heights) for source in self.sources):
+            return True
+        circles = [circle for source in self.sources for circle in source.circles]
+        if not circles:
+            return False
+        meridians = [self._meridian(x) for x in (before, after)]
+        return any(swept(meridians[0], meridians[1], circle) for circle in circles)
+
+    @property
+    def _pole(self) -> bool:
+        """Whether the meridian begins on the axis."""
+        return abs(float(self.space.mesh.position(self.space.mesh.breakpoints()[:1])[0][0])) < 1e-12
+
+    def _meridian(self, x: Array) -> Array:
+        """Positions (rho, eta) of the nodes, shape (2, n)."""
+        s = self.space.node_parameters()
+        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.evaluate(x, s)
+        return np.stack([R + u, Z + w])
 
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""

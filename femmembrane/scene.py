@@ -35,9 +35,11 @@ from numpy.typing import NDArray
 from .discretization.meridian import Disc, Meridian, disc
 from .errors import InputError, unknown_name
 from .physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
-from .physics.magnetics import Dipole, Source
+from .physics.magnetics import Dipole, Source, distance_to_polyline
 from .physics.materials import Material, MooneyRivlin, NeoHookean, Ogden, Varga
 from .physics.scales import AGREEMENT, Scales
+from .physics.sources import Loop, Solenoid, Uniform, Wire
+from .physics.tabulated import Tabulated
 
 MATERIALS: dict[str, Any] = {
     "arruda-boyce": ArrudaBoyce,
@@ -49,7 +51,14 @@ MATERIALS: dict[str, Any] = {
     "varga": Varga,
     "yeoh": Yeoh,
 }
-SOURCES: dict[str, Any] = {"dipole": Dipole}
+SOURCES: dict[str, Any] = {
+    "dipole": Dipole,
+    "loop": Loop,
+    "solenoid": Solenoid,
+    "tabulated": Tabulated,
+    "uniform": Uniform,
+    "wire": Wire,
+}
 SHAPES: dict[str, Any] = {"disc": Disc}
 CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
@@ -233,7 +242,7 @@ class Scene:
     degree : int
         Polynomial degree of the elements, 1 to 8; left out: 2, or as chosen with a mesh for an accuracy (None until then).
     sources : sequence of Source
-        Magnetic sources on the axis; none: nothing magnetic is built.
+        Magnetic sources around the axis; none: nothing magnetic is built.
     susceptibility : float, optional
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
     radius_to_thickness : float, optional
@@ -290,12 +299,13 @@ class Scene:
         for k, source in enumerate(self.sources):
             path = _source_path(k, len(self.sources))
             _require(path, source, ("field",), "a source is allowed, such as Dipole(strength=..., height=...)")
-            # sources stand on the axis, which a meridian meets at its ends only: its breakpoints are enough
+            # the axis is met at the ends of a meridian only: its breakpoints are enough; circles may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
-            if not finite:
-                height = getattr(source, "height", source)
-                raise InputError(f"{path}.height", height, "the source lies on the membrane, where its field is singular; move it off")
+            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in getattr(source, "circles", ()))
+            if touched or not finite:
+                name, reason = getattr(source, "refusal", Source.refusal)
+                raise InputError(f"{path}.{name}", getattr(source, name, source), reason)
         if self.sources and self.susceptibility is None:
             raise InputError(
                 "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"

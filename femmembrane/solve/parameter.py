@@ -173,10 +173,9 @@ class _Scaled:
     source: Any
     factor: Any
 
-    def field(self, rho: Any, eta: Any) -> tuple[Any, Any]:
-        h_rho, h_z = self.source.field(rho, eta)
+    def field(self, rho: Any, eta: Any) -> tuple[Any, ...]:
         amplitude = np.sqrt(self.factor + _TINY)
-        return amplitude * h_rho, amplitude * h_z
+        return tuple(amplitude * component for component in self.source.field(rho, eta))
 
     def intensity(self, rho: Any, eta: Any) -> Any:
         return self.factor * self.source.intensity(rho, eta)

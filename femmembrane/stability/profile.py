@@ -80,7 +80,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
     rho, eta = R + u, Z + w
     mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
-    h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0)
+    h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
     total = total_stress(mechanical, pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)

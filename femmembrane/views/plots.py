@@ -481,7 +481,10 @@ def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium]) -> None:
 
 
 def _draw_sources(axes: Axes, shown: Sequence[Equilibrium]) -> None:
-    """Sources on the axis as arrows along their moments; one further away than the picture is wide is named, not drawn."""
+    """Sources as arrows along their moments, circles around the axis as dots where they cross the plane of the picture.
+
+    One further away than the picture is wide is named, not drawn; one without a place (a uniform field) is neither.
+    """
     eta = np.concatenate([e.profile()["eta"] for e in shown])
     rho = max(float(np.max(e.profile()["rho"])) for e in shown)
     extent = max(float(np.ptp(eta)), 2 * rho)
@@ -496,5 +499,7 @@ def _draw_sources(axes: Axes, shown: Sequence[Equilibrium]) -> None:
         tail, tip = height - 0.08 * up * extent, height + 0.08 * up * extent
         arrow = {"arrowstyle": "-|>", "color": _RED, "linewidth": 2.0, "mutation_scale": 14}
         axes.annotate("", xy=(0, tip), xytext=(0, tail), arrowprops=arrow)
-        axes.plot([0], [height], "o", color=_RED, markersize=6, label=f"{name} at height {height:g}")
+        wires = np.array(source.circles or [(0.0, height)])
+        axes.plot(*wires.T, "o", *(-wires[:, 0], wires[:, 1]), "o", color=_RED, markersize=6)
+        axes.plot([], [], "o", color=_RED, markersize=6, label=f"{name} at height {height:g}")
         axes.update_datalim([(0, tail), (0, tip)])

@@ -299,7 +299,7 @@ def _extent(profile: Mapping[str, Array]) -> float:
 
 
 def _draw_sources(plotter: pyvista.Plotter, equilibrium: Equilibrium, profile: Mapping[str, Array], scale: float) -> list[Array]:
-    """A sphere with an arrow along the moment for each source that is near; a line of text for those that are far away."""
+    """A sphere, or circles, with an arrow along the moment for each source that is near; a line of text for those that are far away."""
     import pyvista
 
     size, drawn, far = 0.1 * _extent(profile), [], []
@@ -314,8 +314,9 @@ def _draw_sources(plotter: pyvista.Plotter, equilibrium: Equilibrium, profile: M
         up = float(getattr(source, "orientation", 1))
         start = (0.0, 0.0, height - 1.2 * up * size)
         arrow = pyvista.Arrow(start=start, direction=(0, 0, up), scale=2.4 * size, tip_length=0.3, tip_radius=0.12, shaft_radius=0.045)
-        sphere = pyvista.Sphere(radius=0.3 * size, center=(0, 0, height))
-        for part in (arrow, sphere):
+        body = [pyvista.Sphere(radius=0.3 * size, center=(0, 0, height))] if not source.circles else []
+        rings = [pyvista.Polygon(center=(0, 0, z), radius=a, n_sides=90, fill=False).tube(radius=0.08 * size) for a, z in source.circles]
+        for part in (arrow, *body, *rings):
             plotter.add_mesh(part, color="#b03060", smooth_shading=True, ambient=0.3)
             drawn.append(np.asarray(part.points))
     if far:

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from .physics.invariant import Fung as Fung
     from .physics.invariant import Gent as Gent
     from .physics.invariant import Yeoh as Yeoh
+    from .physics.loads import Hydrostatic as Hydrostatic
+    from .physics.loads import Load as Load
+    from .physics.loads import Weight as Weight
     from .physics.magnetics import Dipole as Dipole
     from .physics.magnetics import Source as Source
     from .physics.materials import MooneyRivlin as MooneyRivlin
@@ -76,6 +79,7 @@ _ROOMS = {
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.invariant": ("ArrudaBoyce", "Fung", "Gent", "Yeoh"),
+    "physics.loads": ("Hydrostatic", "Load", "Weight"),
     "physics.magnetics": ("Dipole", "Source"),
     "physics.materials": ("MooneyRivlin", "NeoHookean", "Ogden", "Varga"),
     "physics.scales": ("Scales",),

@@ -2,7 +2,7 @@
 
 Only the terms that the scene has are written down, as one CasADi expression at a point in the local variables (u, u_x, w, w_x)::
 
-    E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS],       V = Int rho rho_x eta dx,       both with the 2 pi
+    E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS] + [loads],       V = Int rho rho_x eta dx,       both with the 2 pi
 
 CasADi differentiates it twice, and the instructions of the result are replayed on whole vectors of points, which costs a small part of
 mapping the scalar function over them. Assembly is a constant linear map of the values at the points (:mod:`.discretization.space`), the
@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from .discretization.space import HESSIAN_PAIRS, Space, space_of
 from .errors import InputError
 from .physics.kinematics import hencky_strains
-from .physics.loads import volume_density
+from .physics.loads import over_projection, over_reference, volume_density
 from .physics.magnetics import Source, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
+    from .physics.loads import Load
     from .physics.materials import Material
     from .scene import Scene
 
@@ -57,6 +58,7 @@ class Evaluation:
     force_density: Array
     stiffness_density: Array
     space: Space
+    load_energy: float = 0.0
     _band: Array | None = None
 
     @property
@@ -69,7 +71,7 @@ class Evaluation:
 
     @property
     def energy(self) -> float:
-        return self.elastic_energy + self.magnetic_energy
+        return self.elastic_energy + self.magnetic_energy + self.load_energy
 
 
 class Potential:
@@ -88,13 +90,19 @@ class Potential:
         space = self.space
         # a source of no strength is none: nothing of it is built
         self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
+        self.loads = tuple(load for load in scene.loads if load.acts)
         self._flat = not (space.Z.any() or space.Z_x.any())
         columns = [space.R, space.R_x, space.weights] if self._flat else [space.R, space.R_x, space.weights, space.Z, space.Z_x]
         self.point_data: Array = np.stack([c.ravel() for c in columns])
         with _casadi_answers_numpy():
-            self.symbols, self.terms = _point_expressions(scene, self.sources, self._flat)
+            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, self._flat)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
+
+    @property
+    def surrounded(self) -> bool:
+        """Whether anything but the pressure acts on the membrane: without, the flat unloaded state is an equilibrium of no stiffness."""
+        return bool(self.sources or self.loads)
 
     @property
     def material(self) -> Material:
@@ -114,7 +122,7 @@ class Potential:
 
     @cached_property
     def point_function(self) -> ca.Function:
-        """(data, local variables, (P, magnetic factor)) -> values, gradients and the Hessian at one point."""
+        """(data, local variables, (P, factor on sources and loads)) -> values, gradients and the Hessian at one point."""
         t, (data, local, parameters) = self.terms, self.symbols
         hessian = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local)
         rows = [
@@ -125,6 +133,7 @@ class Potential:
             t["volume_gradient"],
             *(hessian[i, j] for i, j in HESSIAN_PAIRS),
             t["stress"],
+            *([t["load"]] if self.loads else []),
         ]
         return ca.Function("point", [data, local, parameters], [ca.densify(ca.vertcat(*rows))], {"cse": True})
 
@@ -138,15 +147,16 @@ class Potential:
         return _Kernel(self.point_function, self.point_data)
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
-        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales the magnetic energy."""
+        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
         space, shape = self.space, self._force_shape
         out = self._kernel(space.at_quadrature(x), np.array([pressure, magnetic]))
         with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy NaN is the answer, and the caller's to judge
             e, m, v = out[:3].sum(axis=1).tolist()
+            load = float(out[23].sum()) if self.loads else 0.0
             force_density = out[3:11].copy()
             gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
         stiffness_density = out[11:21].reshape(-1, space.n_elements).copy()
-        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, space)
+        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, space, load)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
@@ -208,14 +218,14 @@ class Potential:
         return _point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
 
     def field_energy(self, rho: Array, eta: Array) -> Array:
-        """Magnetic energy density per reference area and its derivatives with respect to the position.
+        """Energy density of sources and loads per reference area and its derivatives with respect to the position.
 
         Returns
         -------
         ndarray, shape (6, n)
-            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources.
+            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources and loads.
         """
-        if not self.sources:
+        if not self.surrounded:
             return np.zeros((6, np.size(rho)))
         return _at_points(self._field_energy_function, rho, eta)
 
@@ -223,7 +233,9 @@ class Potential:
     def _field_energy_function(self) -> ca.Function:
         y = ca.SX.sym("y", 2)
         with _casadi_answers_numpy():
-            density = magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
+            density = over_reference(self.loads, y[0], y[1]) + ca.SX(0)
+            if self.sources:
+                density += magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
         hessian, gradient = ca.hessian(density, y)
         return _point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
@@ -260,7 +272,7 @@ class Family(Potential):
         number = ca.SX.sym("number")
         with _casadi_answers_numpy():
             super().__init__(vary(number), quadrature)
-        self.scene, self.sources = scene, scene.sources
+        self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
@@ -446,7 +458,9 @@ def _potential_of(scene: Scene) -> Potential:
     return Potential(scene)
 
 
-def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
+def _point_expressions(
+    scene: Scene, sources: Sequence[Source], loads: Sequence[Load], flat: bool
+) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
     """Symbols (data, local, parameters) and the weighted densities with their gradients at one point."""
     data = ca.SX.sym("data", 3 if flat else 5)
     local = ca.SX.sym("local", 4)
@@ -470,9 +484,16 @@ def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> t
         magnetic = parameters[1] * magnetic
         second, first = ca.hessian(magnetic, local)
         gradient, hessian = gradient + first, hessian + second
+    load = ca.SX(0)
+    if loads:
+        load = area * over_reference(loads, R + u, Z + w) + weight * (R + u) * (R_x + u_x) * over_projection(loads, Z + w)[0]
+        load = parameters[1] * load
+        second, first = ca.hessian(load, local)
+        gradient, hessian = gradient + first, hessian + second
     return (data, local, parameters), {
         "elastic": area * material.energy(e1, e2),
         "magnetic": magnetic,
+        "load": load,
         "volume": volume,
         "gradient": gradient,
         "hessian": hessian,

@@ -18,7 +18,7 @@ from typing import Any
 
 def total_stress(
     mechanical: tuple[Any, Any],
-    pressure: float,
+    pressure: Any,
     radius_to_thickness: float,
     field: tuple[Any, Any, Any],
     tangent: tuple[Any, Any],
@@ -29,7 +29,7 @@ def total_stress(
     Parameters
     ----------
     mechanical : (lambda_1 W_1, lambda_2 W_2)
-    pressure : P = p R0/(mu T)
+    pressure : P = p R0/(mu T) at the point
     radius_to_thickness : R0/T
     field : (h_rho, h_z, h_theta) in units of sqrt(mu/mu0), strengths included
     tangent : unit tangent (t_rho, t_z) of the deformed meridian

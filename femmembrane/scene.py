@@ -313,13 +313,14 @@ class Scene:
         R, Z = self.mesh.position(self.mesh.breakpoints())
         for k, source in enumerate(self.sources):
             path = _item_path("source", k, len(self.sources))
-            _require(path, source, ("field",), "a source is allowed, such as Dipole(strength=..., height=...)")
+            allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
+            _require(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "refusal"), allowed)
             # the axis is met at the ends of a meridian only: its breakpoints are enough; circles may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
-            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in getattr(source, "circles", ()))
+            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in source.circles)
             if touched or not finite:
-                name, reason = getattr(source, "refusal", Source.refusal)
+                name, reason = source.refusal
                 raise InputError(f"{path}.{name}", getattr(source, name, source), reason)
         if self.sources and self.susceptibility is None:
             raise InputError(

@@ -296,6 +296,27 @@ def test_a_uniform_field_alone_exerts_no_force():
     assert eq.magnetic_energy == pytest.approx(-np.pi * 2.5 / 2 * 5.0, rel=1e-12)
 
 
+class Gradient(fm.Source):
+    """h = k (-rho/2, z), the field around the middle of two opposite coils: all that a source of one's own needs."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def field(self, rho, eta):
+        return -self.k * rho / 2, self.k * eta, 0.0
+
+
+def test_a_source_of_ones_own():
+    scene = magnetic_scene(Gradient(0.2))
+    eq = fm.equilibrium(scene, volume=2.0)
+    assert eq.pressure == pytest.approx(shoot(scene, volume=2.0, guess=Guess.of(eq)).pressure, rel=1e-8)
+    assert eq.verdict(azimuthal=1).stable is True
+    with pytest.raises(fm.InputError, match="it has no name in scene files"):
+        scene.to_dict()
+    with pytest.raises(fm.InputError, match="derived from Source"):
+        magnetic_scene(type("Mine", (), {"field": Gradient.field})())
+
+
 def test_a_membrane_cannot_leave_its_table():
     scene = magnetic_scene(TABLE, elements=8, degree=3)
     with pytest.raises(fm.SolveError) as raised:

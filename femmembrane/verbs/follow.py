@@ -314,7 +314,7 @@ class _Walk:
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
             self.state, self.path = self._first(load), Path()
-        elif load == 0 and not self.potential.sources:
+        elif load == 0 and not self.potential.surrounded:
             self.state, self.path = flat_state(self.potential), Path()
         elif load != self.load:
             try:
@@ -337,7 +337,7 @@ class _Walk:
         return self.state, turn
 
     def _flat(self, x: Array) -> bool:
-        return not self.potential.sources and not x.any()
+        return not self.potential.surrounded and not x.any()
 
     def _first(self, load: float) -> State:
         guess = self.cold(self.potential, load)

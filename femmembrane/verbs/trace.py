@@ -236,7 +236,7 @@ class _Tracing:
         if isinstance(start, Equilibrium):
             state = resume(potential, start)
         elif isinstance(start, (int, float, np.number)) and not isinstance(start, bool) and np.isfinite(start):
-            if start == 0 and not potential.sources:
+            if start == 0 and not potential.surrounded:
                 raise InputError(
                     "start", start, "the flat unloaded membrane has no stiffness to start from; a small volume is allowed, such as 1e-3"
                 )

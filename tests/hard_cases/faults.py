@@ -164,7 +164,7 @@ def interrupted() -> Done:
         _wait_for(out / checkpoint.NAME, process)
         os.kill(process.pid, signal.SIGINT)
         done = ended(process)
-        expect(not torn(out), torn(out))
+        expect((bad := torn(out)) == [], bad)
         kept = table(out)
         expect(json.loads((out / output.RECORD).read_text())["status"] == "interrupted" and 0 < len(kept) < 40, len(kept))
         expect(resumed(scene, out) == Done(0), "not resumed")

@@ -277,7 +277,7 @@ class _Tracing:
         new = next(self.points)
         self.timings["solve"] += time.perf_counter() - clock
         segment = Segment(self.potential, self.point, new)
-        met = [segment.crossing(q, v) for q, v in targets.items() if segment.crosses(q, v)]
+        met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
         if self.special is not None:
             self._look_for_special_points(segment, last)

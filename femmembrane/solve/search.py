@@ -153,12 +153,12 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
 class Limit:
     """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one.
 
-    ``slack`` is the state at which a tension field ended before either was met.
+    ``ill_posed`` is the state at which the branch became so, slack or compressed, before either was met: what follows is the mesh's.
     """
 
     fold: Located | None
     landing: State | None
-    slack: State | None = None
+    ill_posed: State | None = None
 
 
 def beyond_limit(
@@ -192,14 +192,14 @@ def beyond_limit(
     kind = next(k for k, q in FOLDS.items() if q == quantity)
     fold: Located | None = None
     for segment in follow(potential, start, max_steps):
+        if ill_posed(potential, segment.b.state.evaluation) is not None:
+            return Limit(fold, None, segment.b.state)
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
         for met in segment.crossings(quantity, load):
             before = fold is None or met.sigma < fold.point.sigma
             if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
                 return Limit(None if before else fold, met.state)
-        if is_slack(potential, segment.b.state):
-            return Limit(fold, None, segment.b.state)
         if abs(segment.b.state.volume) > FAR:
             break
     return Limit(fold, None)

@@ -68,9 +68,10 @@ def is_slack(potential: Potential, state: State) -> bool:
 
 
 def slackness(potential: Potential, state: State, accepted: list[State] | None = None) -> SolveError:
-    """The error that ends a path at a slack state, with the states accepted before and it."""
+    """The error that ends a path at an ill-posed state, slack or compressed, with the states accepted before and it."""
     where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
-    return SolveError(f"at {where} {ill_posed(potential, state.evaluation)}", status=Status.SLACK, result=accepted)
+    status = Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
+    return SolveError(f"at {where} {ill_posed(potential, state.evaluation)}", status=status, result=accepted)
 
 
 def unsupported(stress: Array, scale: float, tension_field: bool) -> NDArray[np.bool_]:

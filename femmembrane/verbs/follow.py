@@ -277,14 +277,14 @@ class _Walk:
                 states[-1].iterations = sum(s.iterations for s in states)
                 self.state = states[-1]
             except SolveError as error:
-                if error.status is Status.SLACK:
+                if error.status.ill_posed:
                     raise
                 turn = self._turn(error, load)
                 if turn.limit.fold is None and turn.limit.landing is not None:
                     self.state, self.path, self.load = turn.limit.landing, Path(), load
                     return self.state, None
-                if turn.limit.fold is None and turn.limit.slack is not None:
-                    raise slackness(self.potential, turn.limit.slack) from error
+                if turn.limit.fold is None and turn.limit.ill_posed is not None:
+                    raise slackness(self.potential, turn.limit.ill_posed) from error
                 if not jump or turn.limit.landing is None:
                     raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
                 self.state, self.path = turn.limit.landing, Path()

@@ -17,7 +17,7 @@ from ..errors import SolveError, Status
 from ..potential import Potential
 from .continuation import BranchPoint, tangent_at
 from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
-from .newton import correct
+from .newton import correct, relative_size
 from .state import State, flat_state, hermite, rests_flat
 
 #: the folds looked for: their name and the quantity that is stationary
@@ -30,6 +30,8 @@ _CONTROLS: dict[str, Callable[[float], Control]] = {
 }
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
+#: largest relative change of a point by the correction that puts it on a value
+SAME_SIDE = 1e-7
 #: a fold that lies this close to a value, relative to 1 + its size, lies on it
 ON_FOLD = 1e-13
 
@@ -150,7 +152,8 @@ class Segment:
         point = self.at(share)
         pressure = value if quantity == "pressure" else point.state.pressure
         exact = correct(self.potential, _CONTROLS[quantity](value), point.state.x, pressure, tolerance=_EXACT)
-        if exact.status is Status.CONVERGED:  # not so close to a fold that round-off moves the point along the branch
+        # so close to a fold that its two sides are hard to tell apart the corrector may end on the other one, or nowhere
+        if exact.status is Status.CONVERGED and relative_size(self.potential, exact.x - point.state.x, point.state.x) <= SAME_SIDE:
             sigma = point.sigma
             point = tangent_at(self.potential, State.of(exact), point)
             point.sigma = sigma

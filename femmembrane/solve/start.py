@@ -66,18 +66,22 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     magnetic = bool(potential.sources)
     if volume == 0 and rests_flat(potential):
         return flat_state(potential)
+    failure = None
     if magnetic and abs(volume) < START_VOLUME:
         try:
             return _from_either_side(volume, lambda first, state: march(potential, state, VolumeControl, first, volume)[-1], potential)
-        except SolveError:
+        except SolveError as error:
             if volume == 0:  # nowhere to turn the sources on but at the flat state itself
                 raise
+            failure = error
     state = _inflated(potential, volume)
     if not magnetic:
         return state
     try:
         return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1]
     except SolveError as error:
+        if failure is not None and failure.status.ill_posed:  # the better reason
+            raise failure from None
         touching = potential.distance_to_sources((error.result or [state])[-1].x) < NEAR
         raise SolveError(
             f"the sources could not be turned on to their full strength at V = {volume:.6g}; "

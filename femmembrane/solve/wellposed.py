@@ -62,6 +62,18 @@ def _folds(potential: Potential, x: Array, scale: float) -> Array:
     return R[unsupported(stress, scale, True)]
 
 
+def unresolved_source(potential: Potential, x: Array) -> str:
+    """That a source is nearer to the pole than the nodes there are to each other, so that its field is not resolved; empty if none is."""
+    if not potential.sources:
+        return ""
+    space = potential.space
+    u, _, w, _ = space.evaluate(x, space.ends[:2])
+    (R, Z), pole = space.mesh.position(space.ends[1:2]), space.center_height(x)
+    spacing = np.hypot(R[0] + u[1], Z[0] + w[1] - pole) / potential.scene.degree
+    near = float(np.sqrt(min(source.distance_squared(0.0, pole) for source in potential.sources)))
+    return f"the pole is {near:.2g} from a source, where nodes are {spacing:.2g} apart: its field is not resolved" if near < spacing else ""
+
+
 def is_slack(potential: Potential, state: State) -> bool:
     """Whether a state is the end of a tension field."""
     return potential.scene.tension_field and ill_posed(potential, state.evaluation) is not None

@@ -23,7 +23,7 @@ from ..solve.special_points import ON_FOLD
 from ..solve.start import START_VOLUME, start_at_height, start_at_pressure, start_at_volume
 from ..solve.state import Path, State, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
-from ..solve.wellposed import slackness
+from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
 from .meshing import on_chosen_mesh
 from .recording import OnStep, record, resume
@@ -289,6 +289,8 @@ class _Walk:
                     raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
                 self.state, self.path = turn.limit.landing, Path()
         self.load = load
+        if unresolved := unresolved_source(self.potential, self.state.x):
+            raise SolveError(unresolved, status=Status.DIPOLE_CONTACT)
         return self.state, turn
 
     def _through_flat(self, load: float, jump: bool) -> tuple[State, _Turn | None]:

@@ -111,9 +111,7 @@ strength = 200
 """
 
 
-@FAMILY.case(
-    "command, h = 0", "the source lies on the membrane", Exit(2, "source.0.height|source.height"), "height = 0.0", "values = [1.0]"
-)
+@FAMILY.case("command, h = 0", "the source lies on the membrane", Exit(2, "source.height"), "height = 0.0", "values = [1.0]")
 @FAMILY.case("command, h = 0.3", "the source lies in the dome", Exit(3, TORN), "height = 0.3", "values = [0.5]")
 def command(height: str, run: str) -> object:
     return run_file(f"{COMMAND}{height}\n[run]\n{run}\n")

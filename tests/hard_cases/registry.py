@@ -216,7 +216,7 @@ def settled(eq: fm.Equilibrium) -> fm.Equilibrium:
     if not (np.isfinite(eq.state).all() and np.isfinite(force).all() and np.isfinite(numbers).all()):
         raise AssertionError("not finite")
     for scale, index in zip(eq.potential.force_scale(evaluation, eq.pressure), eq.potential.space.fields, strict=True):
-        if np.abs(force[index]).max() > 1e-9 * scale:
+        if np.abs(force[index]).max(initial=0.0) > 1e-9 * scale:
             raise AssertionError(f"forces are out of balance by {np.abs(force[index]).max() / scale:.2g}")
     if evaluation.volume != eq.volume or eq.residual > 1e-9:
         raise AssertionError("what is recorded is not what is recomputed")

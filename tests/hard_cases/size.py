@@ -65,9 +65,9 @@ def few_elements(elements: int, degree: int) -> float:
     return settled(fm.equilibrium(disc_scene(OGDEN, elements=elements, degree=degree), volume=1.0)).pressure
 
 
-@FAMILY.case("one linear element, waves around the axis", "no unknown has any", Stop("mesh.elements", "two, or degree 2"), 1)
+@FAMILY.case("one linear element, two waves around the axis", "no unknown has any", Stop("mesh.elements", "two, or degree 2"), 1)
 def no_waves(elements: int) -> object:
-    return fm.equilibrium(disc_scene(OGDEN, elements=elements, degree=1), volume=1.0).verdict(azimuthal=1)
+    return fm.equilibrium(disc_scene(OGDEN, elements=elements, degree=1), volume=1.0).verdict(azimuthal=2)
 
 
 RATIO = "sizes and stiffnesses differ by {} orders"
@@ -86,7 +86,7 @@ def graded(ratio: float, degree: int) -> float:
 
 
 @FAMILY.case("degree 8, drawn-out pole", "curvature of the pole at height 5.2 by M = 200", Number(1.0, rel=1e-3), 4)
-@FAMILY.case("degree 8, drawn-out pole, 16 elements", "the same", Number(1.0, rel=1e-7), 16)
+@FAMILY.case("degree 8, drawn-out pole, 16 elements", "the same", Number(1.0, rel=1e-5), 16)
 def drawn_out(elements: int) -> float:
     eq, fine = (settled(fm.equilibrium(disc_scene(OGDEN, (200.0, 6.5), n, 8), center_height=5.2)) for n in (elements, 64))
     return eq.pressure / fine.pressure

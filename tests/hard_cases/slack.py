@@ -45,7 +45,7 @@ def traced_to_the_slack_circle() -> fm.Branch:
 SLACK_AT = (0.0345, 0.3211, 0.731)
 
 
-@FAMILY.case("where the slack circle opens, 256 elements", "approached at order 1", Number(SLACK_AT, rel=0.05), 256)
+@FAMILY.case("where the slack circle opens, 256 elements", "approached at order 1", Number(SLACK_AT, rel=0.1), 256)
 def slack_circle(elements: int) -> tuple[float, float, float]:
     scene = disc_scene(OGDEN, STRONG, elements).replace(tension_field=True)
     branch = fm.trace(scene, start=fm.equilibrium(scene, center_height=0.36), until={"center_height": 0.1}, direction=-1)
@@ -56,8 +56,8 @@ def slack_circle(elements: int) -> tuple[float, float, float]:
     return last.volume / (2 * np.pi), last.center_height, float(profile["r"][np.argmin(profile["mechanical_stress_1"])])
 
 
-@FAMILY.case("tension field above the slack circle", "zone borders lie inside elements", Number((3.23276, 0.262500), rel=1e-3), 64)
-@FAMILY.case("the same, 256 elements", "mesh-independent until it opens", Number((3.23276, 0.262500), rel=3e-4), 256)
+@FAMILY.case("tension field above the slack circle", "zone borders lie inside elements", Number((3.234037, 0.262481), rel=2e-4), 64)
+@FAMILY.case("the same, 256 elements", "mesh-independent until it opens", Number((3.234037, 0.262481), rel=5e-6), 256)
 def above_the_slack_circle(elements: int) -> tuple[float, float]:
     """P and V at a pole height of 0.34; recorded on 2026-11-24 with 1024 elements, see tests/verification/test_tension_field.py."""
     eq = settled(fm.equilibrium(disc_scene(OGDEN, STRONG, elements).replace(tension_field=True), center_height=0.34))

@@ -377,6 +377,8 @@ def azimuthal_eigenvalue(potential: Potential, x: Array, pressure: float, n: int
 
 
 def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigenvalue:
+    if not operator.band.shape[1]:
+        raise InputError("mesh.elements", 1, "one linear element has no unknowns with waves around the axis; two, or degree 2, are allowed")
     start = _Spectrum(operator, None).first_guess() if guess is None else guess
     return smallest_eigenvalue(operator.band, operator.mass, operator.half_bandwidth, None, start)
 

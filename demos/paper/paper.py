@@ -23,7 +23,7 @@ MATERIAL = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
 #: numbers of waves around the axis that are tried
 WAVES = (1, 2, 3)
 #: steps of a trace, shorter than accuracy needs, for smooth curves
-STEPS = fm.StepControl(largest=0.06, turn=0.07)
+STEPS = fm.StepControl(largest=0.09, turn=0.1)
 TIPPING = "unstable to 1, 2 or 3 waves around the axis"
 
 
@@ -69,7 +69,8 @@ class Row:
 
     def difference(self, value: float | str | None) -> str:
         if isinstance(self.paper, str) or isinstance(value, str | None):
-            return "same" if self.paper == value else "" if value is None else "differs"
+            decided = self.paper in ("unclear", "uncertain")
+            return "same" if self.paper == value else "" if value is None else "decided" if decided else "differs"
         return f"{value / self.paper - 1:+.1%}"
 
 
@@ -132,7 +133,7 @@ def at_pressures(branch: fm.Branch, pressures: Sequence[float]) -> list[fm.Equil
         t = (pressure - p[k]) / (p[k + 1] - p[k])
         height = (1 - t) * branch[k].center_height + t * branch[k + 1].center_height
         near = fm.equilibrium(branch.scene, center_height=height, start=branch[k])
-        found.append(fm.equilibrium(branch.scene, pressure=pressure, start=near))
+        found.append(fm.equilibrium(branch.scene, pressure=pressure, start=near, solver="newton"))
     return found
 
 
@@ -154,15 +155,15 @@ def draw_curve(axes: Any, branch: fm.Branch, across: str = "volume", up: str = "
     """A branch with its verdicts, and a grey band behind the part that is unstable to waves around the axis."""
     plots.draw_branch(axes, branch, across=across, up=up, dots=False)
     band = [(getattr(eq, across), getattr(eq, up)) if tips(eq) else (np.nan, np.nan) for eq in branch]
-    label = None if TIPPING in axes.get_legend_handles_labels()[1] else TIPPING
-    axes.plot(*np.array(band).T, color="0.8", linewidth=9, solid_capstyle="butt", zorder=1, label=label)
+    if np.isfinite(band).any():
+        label = None if TIPPING in axes.get_legend_handles_labels()[1] else TIPPING
+        axes.plot(*np.array(band).T, color="0.8", linewidth=9, solid_capstyle="butt", zorder=1, label=label)
 
 
 def draw_plain(axes: Any, branch: fm.Branch, across: str = "volume") -> None:
     """The disc without a dipole, thin."""
-    style = plots.Style("no dipole", (0, (8, 2, 1.5, 2)), "#777777", 1.0)
+    style = plots.Style("M = 0", (0, (8, 2, 1.5, 2)), "#777777", 1.0)
     plots.draw_branch(axes, branch, across=across, style=style, dots=False, special_points=False)
-    axes.plot([], [], linestyle=style.dashes, color=style.color, linewidth=style.width)
 
 
 def draw_halves(axes: Any, shown: Sequence[fm.Equilibrium], styles: Sequence[plots.Style]) -> None:

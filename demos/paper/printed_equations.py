@@ -69,7 +69,7 @@ def as_printed(of: fm.Scene, heights: Sequence[float], states: Sequence[fm.Equil
 def _printed(of: fm.Scene, height: float, part: float, guess: Guess) -> Solution:
     material = of.material if isinstance(of.material, fm.Ogden) else fm.Ogden(mu=(1.0,), alpha=(2.0,))
     changed = of.replace(material=AsPrinted(material.mu, material.alpha, part))
-    return collocate(changed, guess=guess, center_height=height, tolerance=1e-6, max_nodes=4000)
+    return collocate(changed, guess=guess, center_height=height, tolerance=1e-5, max_nodes=4000)
 
 
 def integrate(of: fm.Scene, height: float, guess: Guess) -> tuple[float, float]:

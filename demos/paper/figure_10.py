@@ -42,19 +42,21 @@ def save(found: fm.Equilibria, path: Path) -> None:
 
 
 def draw(found: dict[str, fm.Equilibria], path: Path) -> None:
-    """All profiles with their zones by total stress, and the flat ones of (a) again on their own scale."""
-    figure, panels = plots.new_figure((13.0, 5.8), widths=(1, 0.8, 1))
-    flat = [eq for eq in found["a"] if eq.volume < 5]
-    shown = {"a": list(found["a"]), "a, the flat ones": flat, "b": list(found["b"])}
-    for axes, (name, states) in zip(panels, shown.items(), strict=True):
-        paper.draw_halves(axes, states, [plots.verdict_style(eq) for eq in states])
-        strength, height, load = LOADS[name[0]]
-        axes.set_title(f"({name})" if states is flat else f"({name}) P = {load:g}, M = {strength:g}, h = {height:g}", fontsize=10)
-        for eq in states:
-            if states is flat or eq.volume >= 5 or name == "b":
+    """All profiles with their zones by total stress, and the flat ones again on their own scale."""
+    figure, panels = plots.new_figure((14.0, 5.4), widths=(1, 1, 1, 1))
+    for axes, (name, flat) in zip(panels, [(name, flat) for name in found for flat in (False, True)], strict=True):
+        strength, height, load = LOADS[name]
+        shown = [eq for eq in found[name] if eq.volume < 5 or not flat]
+        paper.draw_halves(axes, shown, [plots.verdict_style(eq) for eq in shown])
+        for eq in shown:
+            if flat or eq.volume > 5:
+                above = flat or name == "a" or eq.center_height > 5
+                place = {"xytext": (4, 6 if above else -5), "va": "bottom" if above else "top"}
                 text = f"V = {eq.volume:.4g}" + (", tips" if paper.tips(eq) else "")
-                axes.annotate(text, (0, eq.center_height), xytext=(4, 5), textcoords="offset points", fontsize=9)
-    paper.shared_legend(figure, panels, 3)
+                axes.annotate(text, (0, eq.center_height), textcoords="offset points", fontsize=10, **place)
+        axes.set_title(f"({name}) the flat ones, enlarged" if flat else f"({name}) P = {load:g}, M = {strength:g}, h = {height:g}", fontsize=11)
+        axes.set(xlim=(0, 1.25), ylim=(-0.05, 1.6)) if flat else axes.set(xlim=(0, 3.1), ylim=(-0.2, 4.6 if name == "a" else 7.1))
+    paper.shared_legend(figure, panels, 3, dipole=True)
     plots.save_figure(figure, path)
 
 

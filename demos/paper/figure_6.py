@@ -104,7 +104,7 @@ def draw_profiles(states: dict[int, list[fm.Equilibrium]], path: Path) -> None:
         paper.draw_halves(axes, shown, [plots.verdict_style(eq) for eq in shown])
         axes.set(xlim=(0, 3.1), ylim=(-0.2, 7.1))
         axes.set_title(f"M = {strength}, η(0) = {shown[0].center_height:.2f} to {shown[-1].center_height:.2f}", fontsize=10)
-    paper.shared_legend(figure, panels, 2)
+    paper.shared_legend(figure, panels, 2, dipole=True)
     plots.save_figure(figure, path)
 
 

@@ -45,7 +45,7 @@ def first_met(pressures: np.ndarray, printed: tuple[float, ...]) -> list[float]:
 
 def make(out: Path) -> Result:
     rows: list[Row] = []
-    figure, panels = plots.new_figure((12.0, 5.6), widths=(1, 1, 1))
+    figure, panels = plots.new_figure((13.0, 6.4), widths=(1, 1, 1))
     for axes, (height, letter) in zip(panels, ((-3.25, "a"), (-3.75, "b")), strict=False):
         of = paper.scene(STRENGTH, height, wrinkling="total")
         coarse = paper.at_heights(of, HEIGHTS)
@@ -54,7 +54,7 @@ def make(out: Path) -> Result:
         states = paper.at_heights(of, poles)
         draw_pressures(panels[2], height, coarse, printed, poles)
         paper.draw_halves(axes, states, [plots.verdict_style(eq) for eq in states])
-        axes.set(title=f"({letter}) M = 400, h = {height:g}", ylim=(-1.05, 0.12), xlim=(0, 1.1))
+        axes.set(title=f"({letter}) M = 400, h = {height:g}", ylim=(-1.05, 0.65), xlim=(0, 1.15))
         rows += compare(letter, height, poles, states, printed)
         check(height, coarse, printed, states)
     panels[2].set(xlabel=plots.HEIGHT_LABEL, ylabel=plots.PRESSURE_LABEL)

@@ -174,8 +174,13 @@ def draw_halves(axes: Any, shown: Sequence[fm.Equilibrium], styles: Sequence[plo
     axes.set_xlim(left=0)
 
 
-def shared_legend(figure: Any, panels: Sequence[Any], columns: int, **look: Any) -> None:
-    """One legend below all panels."""
+def shared_legend(figure: Any, panels: Sequence[Any], columns: int, *, dipole: bool = False) -> None:
+    """One legend below all panels; a dipole is named where it is seen."""
     named = dict(pair[::-1] for axes in panels for pair in zip(*plots.legend_entries(axes), strict=True))
-    usual = {"loc": "outside lower center", "ncols": columns, "frameon": False, "fontsize": 10, "handlelength": 3.2}
-    figure.legend(list(named.values()), list(named), **(usual | look))
+    order = [style.label for style in (plots.BOTH, plots.VOLUME_ONLY, plots.UNSTABLE, plots.MARGINAL)]
+    labels = [label for label in order if label in named] + [label for label in named if label not in order and "dipole" not in label]
+    handles = [named[label] for label in labels]
+    if dipole:
+        labels.append("dipole")
+        handles.append(next(handle for label, handle in named.items() if label.startswith("dipole")))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=10, handlelength=3.2)

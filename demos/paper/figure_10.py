@@ -50,11 +50,13 @@ def draw(found: dict[str, fm.Equilibria], path: Path) -> None:
         paper.draw_halves(axes, shown, [plots.verdict_style(eq) for eq in shown])
         for eq in shown:
             if flat or eq.volume > 5:
-                above = flat or name == "a" or eq.center_height > 5
-                place = {"xytext": (4, 6 if above else -5), "va": "bottom" if above else "top"}
+                below = (name == "b" and 4 < eq.center_height < 5) or eq.center_height < 0.4  # what is above is in the way
+                place = {"xytext": (4, -18 if below else 6), "va": "top" if below else "bottom"}
                 text = f"V = {eq.volume:.4g}" + (", tips" if paper.tips(eq) else "")
                 axes.annotate(text, (0, eq.center_height), textcoords="offset points", fontsize=10, **place)
-        axes.set_title(f"({name}) the flat ones, enlarged" if flat else f"({name}) P = {load:g}, M = {strength:g}, h = {height:g}", fontsize=11)
+        axes.set_title(
+            f"({name}) the flat ones, enlarged" if flat else f"({name}) P = {load:g}, M = {strength:g}, h = {height:g}", fontsize=11
+        )
         axes.set(xlim=(0, 1.25), ylim=(-0.05, 1.6)) if flat else axes.set(xlim=(0, 3.1), ylim=(-0.2, 4.6 if name == "a" else 7.1))
     paper.shared_legend(figure, panels, 3, dipole=True)
     plots.save_figure(figure, path)

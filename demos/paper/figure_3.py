@@ -1,11 +1,11 @@
 """Figure 3: the inflated neo-Hookean disc without a dipole, pressure against height of the pole, and profiles.
 
 The paper prints the pressures 1.84, 1.585 and 1.1975 and compares the shapes with Verron & Marckmann, Thin-Walled Structures 41 (2003).
-Taken at pole heights of 1, 2 and 3, as its profiles show them, ours are 1.8399, 1.5833 and 1.1953. The second and third state lie behind the
-limit point (P = 1.879 at a pole height of 1.174): they are stable under volume control only.
+Taken at pole heights of 1, 2 and 3, as its profiles show them, ours are 1.8399, 1.5833 and 1.1953. The second and third state lie behind
+the limit point (P = 1.879 at a pole height of 1.174): they are stable under volume control only.
 
 The differences of 0.1 and 0.2 % are not those of the paper's equations (60) as printed (see figure 6), which for this material
-give 1.8383, 1.5837 and 1.1955: they are those of pole heights lower by 0.003 to 0.005.
+give 1.8383, 1.5837 and 1.1955; they would be those of pole heights of 1.996 and 2.993. What they come from is not known.
 
     python demos/paper/figure_3.py                 picture and table in out/figure-3, 3 seconds
 
@@ -24,9 +24,7 @@ from printed_equations import as_printed
 import femmembrane as fm
 from femmembrane.views import plots
 
-SCENE = fm.Scene(
-    material=fm.NeoHookean(), mesh=fm.disc(elements=16), degree=4, analysis=fm.Analysis(stability=("pressure", "volume"))
-)
+SCENE = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(elements=16), degree=4, analysis=fm.Analysis(stability=("pressure", "volume")))
 PRINTED = {1.0: 1.84, 2.0: 1.585, 3.0: 1.1975}
 
 
@@ -38,7 +36,7 @@ def draw(branch: fm.Branch, states: list[fm.Equilibrium], path: Path) -> None:
     plots.draw_legend(left, loc="lower center", fontsize=10)
     paper.draw_halves(right, states, [plots.verdict_style(eq) for eq in states])
     for eq, text in zip(states, PRINTED.values(), strict=True):
-        place = {"xytext": (5, -8), "textcoords": "offset points", "va": "top", "fontsize": 10}
+        place = {"xytext": (5, -26), "textcoords": "offset points", "va": "top", "fontsize": 10}
         right.annotate(f"P = {eq.pressure:.4f}\npaper {text:g}", (0, eq.center_height), **place)
     right.set(xlim=(0, 2.6), ylim=(-0.1, 3.4))
     plots.save_figure(figure, path)

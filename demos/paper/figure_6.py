@@ -9,7 +9,7 @@ the meridional stress has the circumferential stretch in place of the meridional
 pressures are 2.011, 1.810 and 1.688; and with the poles of the eight profiles at equal distances, two numbers for a list that are fitted,
 all 24 printed pressures are met within 0.007. With the equations (39) the best fit misses by up to 0.09.
 
-What else was tried and does not explain them: the integrator's tolerances (MATLAB's defaults change P by 1e-5 and less), the start at
+What else was tried and does not explain them: the integrator's tolerances (with MATLAB's defaults P changes by 2e-5 at most), the start at
 r = 1e-5, and any one factor on chi M, on mu, on one of the material's moduli or exponents, or other height of the dipole: the
 three strengths would need three different ones (chi M times 0.74, 0.81 and 0.86; h = 6.594, 6.576 and 6.560).
 

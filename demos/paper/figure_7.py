@@ -46,7 +46,7 @@ def make(out: Path) -> Result:
     double = {m: [radius(eq, "double") for eq in shown] for m, shown in states.items()}
     any_kind = {m: [radius(eq, "double", "radial") for eq in shown] for m, shown in states.items()}
     weak, strong = any_kind.values()
-    inside = [(double[m][k], any_kind[m][k]) for m in STRENGTHS for k in range(len(POLES)) if 0 < any_kind[m][k] and double[m][k] < 1]
+    inside = [(double[m][k], any_kind[m][k]) for m in STRENGTHS for k in range(len(POLES)) if any_kind[m][k] > 0 and double[m][k] < 1]
     words = {
         "double wrinkles around the pole": all(double[m][k] > 0 for m in STRENGTHS for k in (0, 1)),
         "single (radial) wrinkles further out": all(inner < outer for inner, outer in inside),
@@ -58,7 +58,8 @@ def make(out: Path) -> Result:
 
     for m, shown in states.items():
         for k, eq in enumerate(shown):
-            print(f"M = {m:g}, η(0) = {eq.center_height:g}: P = {eq.pressure:.4f}, doubly wrinkled to r = {double[m][k]:.3f}, wrinkled to r = {any_kind[m][k]:.3f}")
+            zones = f"doubly wrinkled to r = {double[m][k]:.3f}, wrinkled to r = {any_kind[m][k]:.3f}"
+            print(f"M = {m:g}, η(0) = {eq.center_height:g}: P = {eq.pressure:.4f}, {zones}")
     assert all(words.values()), words
     assert all(eq.zones("mechanical").kinds == ("taut",) for shown in states.values() for eq in shown)
     return Result((out / "figure-7.png",), tuple(rows))

@@ -34,16 +34,19 @@ FIGURES = {3: figure_3, 4: figure_4, 5: figure_5, 6: figure_6, 7: figure_7, 8: f
 MARKERS = ("<!-- gallery: python demos/paper/gallery.py --readme README.md -->", "<!-- end of gallery -->")
 STYLE = """
 body { font: 16px/1.5 sans-serif; max-width: 62em; margin: 2em auto; padding: 0 1em; color: #222 }
-img { max-width: 100%; display: block; margin: 1em 0 } h2 { border-top: 1px solid #bbb; padding-top: 1em; margin-top: 2em }
-table { border-collapse: collapse; font-size: 14px; margin: 1em 0 } td, th { padding: 0.15em 0.8em; border-bottom: 1px solid #ddd; text-align: right }
-td:nth-child(1), td:nth-child(2), th:nth-child(1), th:nth-child(2) { text-align: left } pre, code { background: #f4f4f4; padding: 0.1em 0.3em }
+img { max-width: 100%; display: block; margin: 1em 0 }
+h2 { border-top: 1px solid #bbb; padding-top: 1em; margin-top: 2em }
+table { border-collapse: collapse; font-size: 14px; margin: 1em 0 }
+td, th { padding: 0.15em 0.8em; border-bottom: 1px solid #ddd; text-align: right }
+td:nth-child(1), td:nth-child(2), th:nth-child(1), th:nth-child(2) { text-align: left }
+pre { background: #f4f4f4; padding: 0.2em 0.5em; overflow-x: auto }
 """
 INTRODUCTION = """
 <p>Figures 3 to 10 of P. Saxena, N. H. Reddy and S. P. Pradhan, <i>Magnetoelastic deformation of a circular membrane: wrinkling and limit
-point instabilities</i>, Int. J. Non-Linear Mech. 116 (2019), computed with femmembrane. The tables have the numbers that the paper prints and its
-statements beside ours, and, in the last column, what its equations (60) give when they are taken as they are printed (figure 6 explains).
-In words on stability, "at held V only" is stable among axisymmetric shapes if the volume is held and not if the pressure is; "tips" is
-unstable to 1, 2 or 3 waves around the axis.</p>
+point instabilities</i>, Int. J. Non-Linear Mech. 116 (2019), computed with femmembrane. The tables have the numbers that the paper prints
+and its statements beside ours, and, in the last column, what its equations (60) give when they are taken as they are printed (figure 6
+explains). In words on stability, "at held V only" is stable among axisymmetric shapes if the volume is held and not if the pressure is;
+"tips" is unstable to 1, 2 or 3 waves around the axis; "decided" is what the paper leaves open.</p>
 """
 
 
@@ -74,7 +77,7 @@ def section(number: int, module: ModuleType, result: Result) -> str:
     title, *paragraphs = (module.__doc__ or "").strip().split("\n\n")
     parts = [f'<h2 id="figure-{number}">{escape(title)}</h2>']
     for text in paragraphs:
-        parts.append(f"<pre>{escape(text.strip())}</pre>" if text.startswith("    python") else f"<p>{escape(text)}</p>")
+        parts.append(f"<pre>{escape(text.strip())}</pre>" if text.startswith("    ") else f"<p>{escape(text)}</p>")
     for picture in result.pictures:
         data = base64.b64encode(picture.read_bytes()).decode()
         parts.append(f'<img alt="{escape(picture.stem)}" src="data:image/png;base64,{data}">')

@@ -22,8 +22,8 @@ from femmembrane.views import plots
 MATERIAL = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
 #: numbers of waves around the axis that are tried
 WAVES = (1, 2, 3)
-#: steps of a trace, shorter than accuracy needs, for smooth curves
-STEPS = fm.StepControl(largest=0.09, turn=0.1)
+#: steps of a trace, short enough for smooth curves
+STEPS = fm.StepControl(largest=0.15, turn=0.15)
 TIPPING = "unstable to 1, 2 or 3 waves around the axis"
 
 
@@ -62,16 +62,16 @@ class Row:
     shown: bool = False
 
     def cells(self) -> list[str]:
-        def text(value: float | str | None) -> str:
-            return "" if value is None else value if isinstance(value, str) else f"{value:.4g}"
+        paper = self.paper if isinstance(self.paper, str) else f"{self.paper:.10g}"
+        here = self.here if isinstance(self.here, str) else f"{self.here:.4f}"
+        printed = "" if self.as_printed is None else f"{self.as_printed:.3f}"
+        return [self.figure, self.what, paper, here, self.difference(), printed]
 
-        return [self.figure, self.what, text(self.paper), text(self.here), self.difference(self.here), text(self.as_printed)]
-
-    def difference(self, value: float | str | None) -> str:
-        if isinstance(self.paper, str) or isinstance(value, str | None):
-            decided = self.paper in ("unclear", "uncertain")
-            return "same" if self.paper == value else "" if value is None else "decided" if decided else "differs"
-        return f"{value / self.paper - 1:+.1%}"
+    def difference(self) -> str:
+        """Relative, or in a word."""
+        if isinstance(self.paper, str) or isinstance(self.here, str):
+            return "same" if self.paper == self.here else "decided" if self.paper in ("unclear", "uncertain") else "differs"
+        return f"{round(self.here / self.paper - 1, 3) + 0.0:+.1%}"
 
 
 HEADER = ("figure", "what is shown", "paper", "here", "difference", "by (60) as printed")
@@ -154,7 +154,8 @@ def verdict_words(eq: fm.Equilibrium) -> str:
 def draw_curve(axes: Any, branch: fm.Branch, across: str = "volume", up: str = "pressure") -> None:
     """A branch with its verdicts, and a grey band behind the part that is unstable to waves around the axis."""
     plots.draw_branch(axes, branch, across=across, up=up, dots=False)
-    band = [(getattr(eq, across), getattr(eq, up)) if tips(eq) else (np.nan, np.nan) for eq in branch]
+    sampled = [*branch[::2], branch[-1]]  # verdicts against waves cost more than the curve
+    band = [(getattr(eq, across), getattr(eq, up)) if tips(eq) else (np.nan, np.nan) for eq in sampled]
     if np.isfinite(band).any():
         label = None if TIPPING in axes.get_legend_handles_labels()[1] else TIPPING
         axes.plot(*np.array(band).T, color="0.8", linewidth=9, solid_capstyle="butt", zorder=1, label=label)

@@ -3,11 +3,11 @@
 For the integration from the pole to the rim the paper solves (39) for the second derivatives. That needs the derivative of the meridional
 stress along the radius,
 
-    d/dr dW/dlambda_1 = W_11 lambda_1' + W_12 lambda_2',      dW/dlambda_1 = sum_k mu_k (lambda_1^(alpha_k - 1) - lambda_3^alpha_k/lambda_1).
+    d/dr dW/dlambda_1 = W_11 lambda_1' + W_12 lambda_2',   dW/dlambda_1 = sum_k mu_k (lambda_1^(alpha_k - 1) - lambda_3^alpha_k/lambda_1).
 
 The abbreviations b_k and c_k of (60m), however, have lambda_2 where the last term has lambda_1: together with (60i-l) they are the
-derivative of sum_k mu_k (lambda_1^(alpha_k - 1) - lambda_3^alpha_k/lambda_2), while dW/dlambda_1 itself, (60n), is right. Both agree where the
-stretches are equal, at the pole, and nearly so where lambda_3^alpha is small (the neo-Hookean disc of figure 3). But the third
+derivative of sum_k mu_k (lambda_1^(alpha_k - 1) - lambda_3^alpha_k/lambda_2), while dW/dlambda_1 itself, (60n), is right. Both agree where
+the stretches are equal, at the pole, and nearly so where lambda_3^alpha is small (the neo-Hookean disc of figure 3). But the third
 term of the paper's material has alpha = -2: in a well inflated membrane it is large.
 
 Here are these equations in two ways: as a material whose tangent is changed, for the collocation of the package; and written out, with

@@ -8,7 +8,7 @@ the trace ends there and says so; the place depends on the mesh. Below a pole he
 
 The paper finds that its matrix of Legendre's condition is positive definite in all cases; between those two heights it is not. The paper
 speaks of negative volumes, its text does not say at which h: here there are none with h = -3.25 and -3.5, and there are with h = -3.75.
-Nearly all of the states with a pole below a height of 0.3 are unstable to few waves around the axis: they tip, or wrinkle.
+Most of the states with a pole below a height of 0.3 are unstable to few waves around the axis: they tip, or wrinkle.
 
     python demos/paper/figure_5.py                 picture, curves and special points in out/figure-5, 8 seconds
 """

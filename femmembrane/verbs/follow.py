@@ -288,6 +288,14 @@ class _Turn:
         return f"{where}, from which the membrane would jump to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
 
 
+def _load_of(start: Equilibrium, control: str, potential: Potential, state: State) -> float:
+    """The load of a start; that of the state it was corrected to where this is another one, as in another scene."""
+    given = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
+    height = potential.space.center_height(state.x)
+    found = {"volume": state.evaluation.volume, "pressure": state.pressure, "height": height}[control]
+    return given if abs(found - given) <= 1e-9 * max(abs(given), 1.0) else float(found)
+
+
 class _Walk:
     """From load to load under one control, with the memory that predicts the next state."""
 
@@ -299,7 +307,7 @@ class _Walk:
         self.load = 0.0
         if start is not None:
             self.state = resume(potential, start)
-            self.load = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
+            self.load = _load_of(start, control, potential, self.state)
             if self.corrector is minimize_and_verify and not is_minimum(potential, self.control_at(self.load), self.state.evaluation):
                 message = f"the start (V = {start.volume:.6g}, P = {start.pressure:.6g}) is no minimum under {control} control"
                 raise SolveError(message, status=Status.NOT_A_MINIMUM)

@@ -173,8 +173,11 @@ def stand_in(monkeypatch):
         return [Path(directory) / "branch.csv"]
 
     def install(run, write=write_run):
-        monkeypatch.setitem(sys.modules, "femmembrane.verbs", types.SimpleNamespace(run=run))
-        monkeypatch.setitem(sys.modules, "femmembrane.results.output", types.SimpleNamespace(write_run=write))
+        def observed(scene, on_step, on_checkpoint, unfinished):
+            return run(scene, on_step)
+
+        monkeypatch.setitem(sys.modules, "femmembrane.verbs", types.SimpleNamespace(run=observed))
+        monkeypatch.setitem(sys.modules, "femmembrane.results.output", types.SimpleNamespace(write_run=write, clean=lambda folder: None))
         return written
 
     return install
@@ -326,7 +329,7 @@ def test_disk_full(stand_in, tmp_path, capsys):
         raise OSError(28, "No space left on device")
 
     stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 2)), write)
-    assert main(tmp_path) == cli.BAD_INPUT
+    assert main(tmp_path) == cli.NOT_WRITTEN
     said = capsys.readouterr()
     assert is_one_message(said.err)
     assert "No space left on device" in said.err

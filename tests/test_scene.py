@@ -199,7 +199,7 @@ NAN, INF = math.nan, math.inf
 
 REFUSED = [
     # tables and keys
-    ({}, "material.model", "missing; known: neo-hookean, ogden"),
+    ({}, "material.model", "missing; known: arruda-boyce, fung, gent, mooney-rivlin, neo-hookean, ogden"),
     (plain(materal={}), "materal", "did you mean 'material'"),
     (plain(effects={"tension_feild": True}), "effects.tension_feild", "did you mean 'tension_field'?"),
     (plain(effects={"tension_field": 1}), "effects.tension_field", "true or false"),
@@ -292,7 +292,7 @@ REFUSED = [
     (plain(run={**VOLUME, "start": NAN}), "run.start", "finite"),
     (plain(run={**VOLUME, "stop": "2"}), "run.stop", "finite"),
     (plain(run={**VOLUME, "stop": False}), "run.stop", "finite"),
-    (plain(run={**VOLUME, "steps": 0}), "run.steps", ">= 1"),
+    (plain(run={**VOLUME, "steps": 0}), "run.steps", "from 1 to 1000000"),
     (plain(run={**VOLUME, "steps": 4.0}), "run.steps", "whole number"),
     (plain(run={**VOLUME, "values": [1.0]}), "run.start", "run.values"),
     (plain(run={**VOLUME, "until": {"volume": 1.0}}), "run.until", "start, stop and steps"),
@@ -304,7 +304,7 @@ REFUSED = [
     (plain(run={"values": [0.5, True]}), "run.values[1]", "finite"),
     (plain(run={**LENGTH, "stop": 2.0}), "run.stop", "start and until"),
     (plain(run={**LENGTH, "values": [2.0]}), "run.values", "start and until"),
-    (plain(run={**LENGTH, "max_steps": 0}), "run.max_steps", ">= 1"),
+    (plain(run={**LENGTH, "max_steps": 0}), "run.max_steps", "from 1 to 1000000"),
     (plain(run={**LENGTH, "until": {"height": 2.0}}), "run.until", "center_height"),
     (plain(run={**LENGTH, "until": {"volume": NAN}}), "run.until.volume", "finite"),
     (plain(run={**LENGTH, "until": {}}), "run.until", "one quantity"),

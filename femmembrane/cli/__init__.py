@@ -1,6 +1,7 @@
 """The command ``femmembrane``: a scene file in, a folder of results out.
 
-Exit codes: 0 done, 2 bad input, 3 not converged (what was computed is written), 130 interrupted (what was computed is written).
+Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
+full disk), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
 In a pipe nothing is printed but errors, one line each on stderr. One module a command; whatever is slow to import is imported
 inside its functions, for ``--help`` should answer at once.
 """
@@ -14,9 +15,9 @@ from cyclopts import App, CycloptsError
 from .. import __version__
 from ..errors import InputError
 from . import completion, convergence, cost, export, report, run, scenes, view
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, fail
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail
 
-__all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "app", "main"]
+__all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
 
 app = App(
     name="femmembrane",

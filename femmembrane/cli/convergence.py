@@ -8,13 +8,14 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import prepare, read
 from .interrupts import Interrupts
-from .outcome import DONE, NOT_CONVERGED, explain, fail
+from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
 
 
 def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
     """Solve the last equilibrium that a scene file asks for on many meshes, and write convergence.csv and convergence.png to a folder.
 
-    Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 130 interrupted.
+    Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 4 results
+    could not be written, 130 interrupted.
 
     Parameters
     ----------
@@ -32,9 +33,10 @@ def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements
     asked = read(scene)
     meshes = {"degrees": _numbers("--degrees", degrees, MAX_DEGREE), "elements": _numbers("--elements", elements)}
     prepare(out)
+    from ..results.lock import locked
     from ..verbs.convergence import convergence_of_run
 
-    with Interrupts() as interrupts:
+    with locked(out), Interrupts() as interrupts:
         try:
             study = convergence_of_run(asked, **meshes)
         except SolveError as error:
@@ -45,8 +47,8 @@ def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements
         try:
             study.write_csv(written[0])
             study.plot(written[1])
-        except OSError as error:
-            raise InputError("--out", str(out), f"the results could not be written ({error.strerror or error})") from None
+        except (InputError, OSError) as error:
+            return fail(NOT_WRITTEN, not_written(error, out))
     if study.messages:
         return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
     if sys.stdout.isatty():

@@ -12,7 +12,7 @@ class Interrupts:
     """Ctrl-C that is never lost, and spares the files.
 
     Compiled solvers may swallow the exception that an interrupt raises, so it is also noted, and raised again at the next :meth:`check`.
-    While ``hold`` is set the first interrupt is noted only: the results are written to the end; a second one gets through.
+    While ``hold`` is set the first interrupt is noted only, so that a step or the results are finished; a second one gets through.
     """
 
     def __init__(self) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
-from ..errors import Status
+from ..errors import InputError, Status
 
-DONE, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 130
+DONE, BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, INTERRUPTED = 0, 2, 3, 4, 130
 
 
 def fail(code: int, message: str) -> int:
@@ -22,3 +23,8 @@ def explain(status: Status, message: str) -> str:
 
 def count(number: int) -> str:
     return f"{number} equilibrium" if number == 1 else f"{number} equilibria"
+
+
+def not_written(error: Exception, out: Path) -> str:
+    text = error.allowed if isinstance(error, InputError) else getattr(error, "strerror", None) or str(error)
+    return f"results could not be written to {out} ({text})"

@@ -55,6 +55,8 @@ class Equilibrium:
         Wall time spent on this equilibrium and its verdicts.
     gas : Gas or None
         The enclosed gas that holds it, when found under gas control.
+    load_energy : float
+        Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without.
     """
 
     pressure: float
@@ -69,14 +71,15 @@ class Equilibrium:
     state: Array = field(repr=False)
     seconds: float = field(default=0.0, repr=False)
     gas: Gas | None = field(default=None, repr=False)
+    load_energy: float = field(default=0.0, repr=False)
     _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
     _zones: dict[str, Zones] = field(default_factory=dict, repr=False)
     _errors: dict[str, ErrorEstimate] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
-        """Elastic plus magnetic energy."""
-        return self.elastic_energy + self.magnetic_energy
+        """Elastic, magnetic and load energy."""
+        return self.elastic_energy + self.magnetic_energy + self.load_energy
 
     @property
     def potential(self) -> Potential:
@@ -256,26 +259,39 @@ class SpecialPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class TraceMemory:
-    """What the next step of a trace depends on, so that an interrupted one goes on as if it had not been.
+class PathMemory:
+    """What the next equilibrium of a run depends on besides the last one, so that an interrupted run goes on as if it had not been.
 
     Attributes
     ----------
     sigma : tuple of float
-        Arc length at the last two points (one at the very start).
+        Load (in a trace: arc length) at the last points that predict the next one, two at most.
     points, slopes : ndarray, shape (len(sigma), n_free + 1)
-        (x, P) and its unit tangent there.
-    step : float
-        Length of the next step.
-    regular : int
-        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
+        (x, P) and its derivative with respect to sigma there.
     """
 
     sigma: tuple[float, ...]
     points: Array
     slopes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TraceMemory(PathMemory):
+    """The same for a trace by arc length.
+
+    Attributes
+    ----------
+    step : float
+        Length of the next step.
+    regular : int
+        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
+    unexplained : tuple of str
+        Changes of inertia met so far at which no special point was located.
+    """
+
     step: float
     regular: int
+    unexplained: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +325,7 @@ class Branch(Sequence[Equilibrium]):
     timings : mapping of str to float
         Seconds by stage.
     special_points : tuple of SpecialPoint, or None when none were looked for
-    memory : TraceMemory, or None for a branch that was not traced by arc length
+    memory : TraceMemory for a branch traced by arc length, PathMemory for an unfinished run by loads, else None
     jumps : tuple of Jump
         Where a run snapped because the branch turned back before a load.
     solver : str
@@ -322,7 +338,7 @@ class Branch(Sequence[Equilibrium]):
     message: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
     special_points: tuple[SpecialPoint, ...] | None = None
-    memory: TraceMemory | None = field(default=None, repr=False)
+    memory: PathMemory | None = field(default=None, repr=False)
     jumps: tuple[Jump, ...] = ()
     solver: str = ""
 

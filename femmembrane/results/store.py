@@ -7,6 +7,7 @@ the one that was saved; everything else in the file can be read without this pac
 
 from __future__ import annotations
 
+import io
 import json
 import secrets
 import tomllib
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from ..accuracy.error_estimate import ErrorEstimate
     from ..scene import Scene
     from ..stability.verdict import Verdict
-    from .records import Branch, Equilibrium, Jump, SpecialPoint, TraceMemory
+    from .records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 
 FORMAT = 1
 
@@ -48,6 +49,7 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "center_height": ("height of the pole over R0", "1"),
     "elastic_energy": ("elastic energy over mu T R0^2", "1"),
     "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
+    "load_energy": ("energy of the loads over mu T R0^2", "1"),
     "residual": ("out-of-balance force relative to the forces in balance", "1"),
     "iterations": ("solver iterations, rejected attempts included", "1"),
     "seconds": ("wall time spent on the equilibrium", "s"),
@@ -63,9 +65,9 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "kind": ("kind of the special point", "1"),
     "error": ("uncertainty of the special point's location", "1"),
     "azimuthal": ("number of waves around the axis of the instability that sets in", "1"),
-    "trace_sigma": ("arc length at the last points of the trace", "1"),
-    "trace_point": ("state and pressure at the last points of the trace", "1"),
-    "trace_slope": ("their derivatives with respect to arc length", "1"),
+    "trace_sigma": ("arc length, or load, at the last points of the path", "1"),
+    "trace_point": ("state and pressure at the last points of the path", "1"),
+    "trace_slope": ("their derivatives with respect to arc length or load", "1"),
     "jump_index": ("number of the equilibrium that a snap of the membrane landed on", "1"),
     "jump_limit": ("whether the fold before the snap was located", "1"),
     "fraction_taut": ("part of the reference area that is taut", "1"),
@@ -95,7 +97,7 @@ Array = NDArray[np.float64]
 #: a variable of a data set: dimensions and values
 _Variable = tuple[tuple[str, ...], Any]
 
-_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "seconds")
+_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "load_energy", "residual", "seconds")
 _SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
 #: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
 _SPECIAL, _LIMIT = "special_", "limit_"
@@ -167,8 +169,10 @@ def save(branch: Branch, path: str | PathLike[str]) -> None:
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }
+    image = io.BytesIO()  # HDF5 itself does not survive a full disk: it is met here, by one plain write
+    dataset.to_netcdf(image, engine="h5netcdf", encoding=encoding)
     with replace_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+        temporary.write_bytes(image.getbuffer())
 
 
 def load(path: str | PathLike[str]) -> Branch:
@@ -219,8 +223,12 @@ def _table_variables(branch: Branch) -> dict[str, _Variable]:
 
 def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, _Variable]:
     """What :func:`_equilibria` needs to build the records again; ``width`` is the length of their states."""
-    magnetic = any(e.scene.sources for e in equilibria)
-    scalars = [name for name in _SCALARS if magnetic or name != "magnetic_energy"]
+    absent = {
+        name
+        for name, kind in (("magnetic_energy", "sources"), ("load_energy", "loads"))
+        if not any(getattr(e.scene, kind) for e in equilibria)
+    }
+    scalars = [name for name in _SCALARS if name not in absent]
     return {
         **{prefix + name: ((dimension,), _array(name, (getattr(e, name) for e in equilibria))) for name in scalars},
         prefix + "iterations": ((dimension,), _array("iterations", (e.iterations for e in equilibria))),
@@ -343,8 +351,17 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         **({"solver": branch.solver} if branch.solver else {}),
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
-        **({"trace_step": branch.memory.step, "trace_regular": branch.memory.regular} if branch.memory is not None else {}),
+        **_trace_attributes(branch.memory),
     }
+
+
+def _trace_attributes(memory: PathMemory | None) -> dict[str, Any]:
+    from .records import TraceMemory
+
+    if not isinstance(memory, TraceMemory):
+        return {}
+    unexplained = {"trace_unexplained": json.dumps(memory.unexplained)} if memory.unexplained else {}
+    return {"trace_step": memory.step, "trace_regular": memory.regular, **unexplained}
 
 
 def _read(path: str | PathLike[str]) -> xarray.Dataset:
@@ -399,14 +416,17 @@ def _special_points(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple
     )
 
 
-def _memory(dataset: xarray.Dataset) -> TraceMemory | None:
-    from .records import TraceMemory
+def _memory(dataset: xarray.Dataset) -> PathMemory | None:
+    from .records import PathMemory, TraceMemory
 
     if "trace_sigma" not in dataset:
         return None
     points, slopes = (np.array(dataset[name].values, dtype=np.float64) for name in ("trace_point", "trace_slope"))
     sigma = tuple(dataset["trace_sigma"].values.tolist())
-    return TraceMemory(sigma, points, slopes, float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"]))
+    if "trace_step" not in dataset.attrs:
+        return PathMemory(sigma, points, slopes)
+    unexplained = tuple(json.loads(dataset.attrs.get("trace_unexplained", "[]")))
+    return TraceMemory(sigma, points, slopes, float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"]), unexplained)
 
 
 def _jumps(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:

@@ -71,29 +71,48 @@ def minimize(
     scales[potential.space.fields[0]], scales[potential.space.fields[1]] = scale_u, scale_w
     objective = float(np.abs(scales * evaluation.gradient).max(initial=0.0)) or 1.0
     volume = float(np.abs(scales * evaluation.volume_gradient).max(initial=0.0)) or 1.0
-    solver = _solver(potential, isinstance(control, VolumeControl), max_iterations)
-    start: dict[str, Any] = {"x0": x / scales}
     if isinstance(control, VolumeControl):
-        target = control.volume / volume
-        start |= {
-            "p": [0.0, magnetic, scale_u, scale_w, objective, volume],
-            "lbg": target,
-            "ubg": target,
-            "lam_g0": -pressure * volume / objective,
-        }
+        solver, held = _solver(potential, True, max_iterations), 0.0
+        solver.target[:] = control.volume / volume
+        solver.multiplier[:] = -pressure * volume / objective
     elif isinstance(control, PressureControl):
-        start |= {"p": [control.pressure, magnetic, scale_u, scale_w, objective, volume]}
+        solver, held = _solver(potential, False, max_iterations), control.pressure
     else:
         raise TypeError(f"IPOPT minimises under volume or pressure control, not {type(control).__name__}")
-    solution = solver(**start)
-    stats = solver.stats()
-    found = np.asarray(solution["x"]).ravel() * scales
-    p = -float(solution["lam_g"]) * objective / volume if isinstance(control, VolumeControl) else control.pressure
-    return found, p, int(stats.get("iter_count", 0)), str(stats["return_status"])
+    solver.parameters[:] = held, magnetic, scale_u, scale_w, objective, volume
+    found, multiplier, iterations, status = solver(x / scales)
+    return found * scales, -float(multiplier[0]) * objective / volume if multiplier.size else held, iterations, status
+
+
+class _Solver:
+    """IPOPT on one problem, called through arrays: turning them into CasADi's matrices and back takes as long as two iterations.
+
+    The next call has the ``parameters``, the ``target`` of the constraint and its ``multiplier`` as they are then.
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        n, m = function.numel_in(0), function.numel_out(2)
+        self._x, self.parameters = np.zeros(n), np.zeros(6)
+        self.target, self.multiplier = np.zeros(m), np.zeros(m)
+        free = np.full(n, np.inf)
+        self._inputs = (self._x, self.parameters, -free, free, self.target, self.target, np.zeros(n), self.multiplier)
+        self._outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
+        self._buffer, self._call = function.buffer()
+        for k, array in enumerate(self._inputs):
+            self._buffer.set_arg(k, memoryview(array))  # type: ignore[arg-type, call-arg]
+        for k, array in enumerate(self._outputs):
+            self._buffer.set_res(k, memoryview(array))  # type: ignore[arg-type, call-arg]
+
+    def __call__(self, x: Array) -> tuple[Array, Array, int, str]:
+        """Minimiser, multiplier of the constraint, iterations and IPOPT's return status, from a guess."""
+        self._x[:] = x
+        self._call()
+        stats = self._buffer.stats()
+        return self._outputs[0].copy(), self._outputs[4].copy(), int(stats.get("iter_count", 0)), str(stats["return_status"])
 
 
 @lru_cache(maxsize=32)
-def _solver(potential: Potential, constrained: bool, max_iterations: int) -> ca.Function:
+def _solver(potential: Potential, constrained: bool, max_iterations: int) -> _Solver:
     functions = nlp_functions(potential)
     y, p = ca.MX.sym("y", potential.space.n_free), ca.MX.sym("p", 6)
     problem = {"x": y, "p": p, "f": functions.value(y, p)}
@@ -104,7 +123,7 @@ def _solver(potential: Potential, constrained: bool, max_iterations: int) -> ca.
     else:
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 0)
         options["hess_lag"] = ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [functions.hessian(y, p, lam_f, 0.0)])
-    return ca.nlpsol("ipopt", "ipopt", problem, options)
+    return _Solver(ca.nlpsol("ipopt", "ipopt", problem, options))
 
 
 def minimize_and_verify(
@@ -151,7 +170,7 @@ def nlp_functions(potential: Potential) -> NlpFunctions:
     data = ca.DM(potential.point_data.T)
 
     t, (_, local_symbol, parameters) = potential.terms, potential.symbols
-    total = t["elastic"] + t["magnetic"] - parameters[0] * t["volume"]
+    total = t["elastic"] + t["magnetic"] + t["load"] - parameters[0] * t["volume"]
     force = t["gradient"] - parameters[0] * t["volume_gradient"]
     curvature = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local_symbol)
 

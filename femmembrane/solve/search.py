@@ -45,7 +45,7 @@ class Search:
 
     def run(self) -> None:
         """Trace the branches through the starts, then deflate until nothing new appears."""
-        if self.load == 0 and not self.potential.sources:
+        if self.load == 0 and not self.potential.surrounded:
             self._add(flat_state(self.potential))
         for volume in STARTS:
             try:

@@ -1,12 +1,13 @@
 """Cold starts: an equilibrium at a volume without a neighbour to start from.
 
 The order of loading is fixed, so that the answer is one state and not an accident of the optimiser: the membrane is inflated without
-its sources first, then their energy is turned on at constant volume.
+its sources and loads first, then their energy is turned on at constant volume.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
@@ -26,6 +27,8 @@ START_VOLUME = 0.5
 NEAR = 0.2
 #: from this volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
 SAFE_VOLUME = 10.0
+#: up to this volume every membrane is a dome to which linear elasticity applies: a dome that fails there is not tried smaller
+SMALL_VOLUME = 0.05
 
 
 def spherical_dome(potential: Potential, volume: float) -> Array:
@@ -35,7 +38,7 @@ def spherical_dome(potential: Potential, volume: float) -> Array:
     """
     space = potential.space
     s = space.interpolation_points()
-    height = 2 * np.sinh(np.arcsinh(3 * volume / np.pi) / 3)
+    height = 2 * np.sinh(np.arcsinh(volume * (3 / np.pi)) / 3)
     if height == 0:
         return np.zeros(space.n_free)
     radius = (1 + height**2) / (2 * height)
@@ -60,7 +63,7 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     SolveError
         When the path ends before the full strength of the sources, or a dome cannot be inflated to the volume.
     """
-    magnetic = bool(potential.sources)
+    magnetic = potential.surrounded
     if magnetic and abs(volume) < START_VOLUME:
         try:
             return _from_either_side(volume, lambda first, state: march(potential, state, VolumeControl, first, volume)[-1], potential)
@@ -83,15 +86,18 @@ def start_at_volume(potential: Potential, volume: float) -> State:
 
 def _inflated(potential: Potential, volume: float) -> State:
     """Equilibrium without sources."""
-    result = correct(potential, VolumeControl(volume), spherical_dome(potential, volume), 0.0, magnetic=0.0, damped=True, max_iterations=40)
+    with np.errstate(over="ignore", invalid="ignore"):  # a dome may be too large or small for its energy to be a number: not converged
+        dome = spherical_dome(potential, volume)
+        result = correct(potential, VolumeControl(volume), dome, 0.0, magnetic=0.0, damped=True, max_iterations=40)
     if result.status is Status.CONVERGED:
         return State.of(result)
     bad = ill_posed(potential, result.evaluation)
     if bad is not None and bad.slack:
         raise SolveError(f"no tension holds a dome of volume {volume:.6g}: {bad}", status=Status.SLACK)
-    if abs(volume) <= SAFE_VOLUME:
+    if abs(volume) <= SMALL_VOLUME:
         raise SolveError(f"no dome of volume {volume:.6g} could be inflated; {result.status.advice}", status=result.status)
-    first = np.copysign(SAFE_VOLUME, volume)
+    # a dome may be far from the equilibrium, or, where a material locks, outside the domain of its energy
+    first = np.copysign(SAFE_VOLUME if abs(volume) > SAFE_VOLUME else abs(volume) / 4, volume)
     return march(potential, _inflated(potential, first), VolumeControl, first, volume, magnetic=0.0)[-1]
 
 
@@ -99,28 +105,39 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
     """The first stable equilibrium at a pressure on the branch through the moderately inflated membrane.
 
     The branch is followed by arc length from a small volume in the direction in which the pressure approaches the wanted one, then in
-    the other; the first crossing that is a minimum under pressure control is returned.
+    the other; the first crossing that is a minimum under pressure control is returned. Where sources or loads act the branch may end
+    before it comes to the flat membrane, and another one begins on the other side of it: that one is tried last.
 
     Raises
     ------
     SolveError
         With status NO_EQUILIBRIUM when neither direction crosses the pressure in a minimum.
     """
-    flat = not potential.sources
+    flat = not potential.surrounded
     if pressure == 0 and flat:
         return flat_state(potential)
     # without sources a nearly flat membrane obeys P = 3.34 V^3, and its mirror image carries the opposite pressure
     size = min(START_VOLUME, (abs(pressure) / 4) ** (1 / 3)) if flat else START_VOLUME
     volume = float(np.copysign(size, pressure))
-    state = start_at_volume(potential, volume)
+    found = _through(potential, start_at_volume(potential, volume), pressure)
+    if found is None and not flat:
+        with suppress(SolveError):  # the failure on this side of the flat membrane is the one to report
+            found = _through(potential, start_at_volume(potential, -volume), pressure)
+    if found is not None:
+        return found
+    raise SolveError(
+        f"no stable equilibrium at P = {pressure:.9g} was met on the branch through V = {volume:.6g}", status=Status.NO_EQUILIBRIUM
+    )
+
+
+def _through(potential: Potential, state: State, pressure: float) -> State | None:
+    """The first minimum at a pressure on the branch through a state, None if there is none."""
     up = 1 if (state.pressure < pressure) == (first_point(potential, state, 1).rate("pressure", potential) > 0) else -1
     for direction in (up, -up):
         found = _first_minimum(potential, first_point(potential, state, direction), pressure)
         if found is not None:
             return found
-    raise SolveError(
-        f"no stable equilibrium at P = {pressure:.9g} was met on the branch through V = {volume:.6g}", status=Status.NO_EQUILIBRIUM
-    )
+    return None
 
 
 def flat_state(potential: Potential) -> State:
@@ -130,7 +147,7 @@ def flat_state(potential: Potential) -> State:
 
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
-    if height == 0 and not potential.sources:
+    if height == 0 and not potential.surrounded:
         return flat_state(potential)
 
     def follow(_: float, state: State) -> State:

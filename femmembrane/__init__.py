@@ -52,6 +52,9 @@ if TYPE_CHECKING:
     from .verbs.cost import Cost as Cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
+    from .verbs.sweep import Sweep as Sweep
+    from .verbs.sweep import plan_sweep as plan_sweep
+    from .verbs.sweep import sweep as sweep
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk
 
@@ -76,6 +79,7 @@ _ROOMS = {
     "stability.zones": ("Zone", "Zones"),
     "verbs.cost": ("Cost",),
     "verbs.folds": ("Cusp", "FoldCurve"),
+    "verbs.sweep": ("Sweep", "plan_sweep", "sweep"),
     "verbs": (
         *(
             "Equilibria",

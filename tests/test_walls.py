@@ -34,7 +34,10 @@ KEPT_IN = {
     "skfem": ("discretization/",),
 }
 #: only inside functions
-HEAVY = ("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "distributed", "vtk", "vtkmodules", "h5netcdf", "netCDF4", "rich", "tomli_w")
+HEAVY = (
+    *("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "distributed"),
+    *("vtk", "vtkmodules", "h5netcdf", "netCDF4", "rich", "tomli_w"),
+)
 
 
 def name_of(path: Path) -> str:

@@ -69,8 +69,14 @@ def dataset_of(over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: 
     variables: dict[str, Any] = {}
     for name in names:
         values, (dim, meaning) = [row.values.get(name) for row in rows], MEANING[name]
-        series = any(np.ndim(v) for v in values)
-        data = _stacked(values) if series else _text(values) if name == "outcome" else np.array([np.nan if v is None else v for v in values], float)
+        series = any(isinstance(v, np.ndarray) for v in values)
+        data = (
+            _stacked(values)
+            if series
+            else _text(values)
+            if name == "outcome"
+            else np.array([np.nan if v is None else v for v in values], float)
+        )
         about = {"long_name": meaning, "units": "1"}
         variables[name] = (*dims, dim) if series else dims, data.reshape(shape + data.shape[1:]), about
     variables["status"] = dims, _text([r.status for r in rows]).reshape(shape), {"long_name": "how the computation of the scene ended"}
@@ -86,7 +92,10 @@ def dataset_of(over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: 
 def save_dataset(dataset: xarray.Dataset, path: str | PathLike[str]) -> None:
     """Write a data set to a NetCDF file, whole or not at all; series are compressed."""
     encoding = {
-        str(name): {"_FillValue": None, **({"zlib": True, "complevel": 1, "shuffle": True} if variable.size > math.prod(variable.shape[:1]) else {})}
+        str(name): {
+            "_FillValue": None,
+            **({"zlib": True, "complevel": 1, "shuffle": True} if variable.size > math.prod(variable.shape[:1]) else {}),
+        }
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }

@@ -35,10 +35,7 @@ def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     place: Any = changed
     *path, last = key.split(".")
     for depth, name in enumerate(path):
-        if isinstance(place, dict):
-            place = place.setdefault(name, {})
-        else:
-            place = place[_index(place, key, depth)]
+        place = place.setdefault(name, {}) if isinstance(place, dict) else place[_index(place, key, depth)]
     if isinstance(place, dict):
         place[last] = value
     else:

@@ -22,7 +22,7 @@ from .quantities import UNEXPECTED, Options, Row, compute
 #: key, scene, quantity, options
 Task = tuple[str, Scene, str, Options]
 #: seconds in which a first worker must have answered
-_PATIENCE = 60.0
+_PATIENCE = 120.0
 
 
 def cores() -> int:
@@ -32,14 +32,14 @@ def cores() -> int:
 
 def here(tasks: Iterator[Task]) -> Iterator[tuple[str, Row]]:
     """One after the other, in this process."""
-    for key, *what in tasks:
-        yield key, compute(*what)
+    for key, scene, quantity, options in tasks:
+        yield key, compute(scene, quantity, options)
 
 
 def on_cores(tasks: Iterator[Task], workers: int) -> Iterator[tuple[str, Row]]:
     """In processes of this machine.
 
-    When one dies, the scenes that were under way are each tried alone: one whose process dies again has a row that says so.
+    When one dies, the scenes that were under way are tried again one by one: one whose process dies again has a row that says so.
 
     Raises
     ------
@@ -55,8 +55,7 @@ def on_cores(tasks: Iterator[Task], workers: int) -> Iterator[tuple[str, Row]]:
             return
         except BrokenProcessPool:
             pass
-        for task in under_way.values():
-            yield task[0], _alone(task)
+        yield from _one_by_one(list(under_way.values()))
 
 
 def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]:
@@ -83,7 +82,9 @@ def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]
 @contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
     # spawned, not forked: a fork copies locks that threads of the numerical libraries may hold
-    executor = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL))
+    executor = ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
+    )
     try:
         yield executor
     except BaseException:
@@ -119,9 +120,9 @@ def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task]
     """Keep an executor busy with no more tasks than there is room for; ``under_way`` holds what has not come back."""
     futures: dict[Future[Row], str] = {}
     for task in tasks:
-        key, *what = task
+        key, scene, quantity, options = task
         under_way[key] = task
-        futures[executor.submit(compute, *what)] = key
+        futures[executor.submit(compute, scene, quantity, options)] = key
         if len(futures) >= room():
             yield from _finished(futures, under_way)
     while futures:
@@ -141,9 +142,15 @@ def _finished(futures: dict[Future[Row], str], under_way: dict[str, Task]) -> It
         yield key, row
 
 
-def _alone(task: Task) -> Row:
-    with _processes(1) as executor:
+def _one_by_one(left: list[Task]) -> Iterator[tuple[str, Row]]:
+    """Suspects: in one process, and in another one whenever that dies."""
+    while left:
         try:
-            return executor.submit(compute, *task[1:]).result()
+            with _processes(1) as executor:
+                while left:
+                    key, scene, quantity, options = left[0]
+                    row = executor.submit(compute, scene, quantity, options).result()
+                    left.pop(0)
+                    yield key, row
         except BrokenProcessPool:
-            return Row(UNEXPECTED, "the process that computed it died (out of memory, or killed)", {})
+            yield left.pop(0)[0], Row(UNEXPECTED, "the process that computed it died (out of memory, or killed)", {})

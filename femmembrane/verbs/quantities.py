@@ -209,8 +209,8 @@ def _where_compressed(scene: Scene, before: Equilibrium, after: Equilibrium, cri
     for name in ("center_height", "volume"):
 
         def at(load: float, name: str = name) -> Equilibrium:
-            solver: Any = {"solver": "newton"} if name == "volume" else {}
-            return equilibrium(plain, **{name: load}, start=before, **solver)
+            where: dict[str, Any] = {name: load}
+            return equilibrium(plain, **where, start=before, solver="newton")
 
         def stress(load: float, at: Callable[[float], Equilibrium] = at) -> float:
             return _smallest_stress(at(load), criterion)

@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
@@ -211,7 +210,12 @@ def sweep(
             _keep(kept, key, row)
             if on_scene is not None:
                 on_scene(len(rows), len(grid.distinct), failed)
-    facts = {"quantity": quantity, "scene": scene_text(scene), "over": json.dumps(list(grid.over)), "options": json.dumps(asdict(grid.options))}
+    facts = {
+        "quantity": quantity,
+        "scene": scene_text(scene),
+        "over": json.dumps(list(grid.over)),
+        "options": json.dumps(asdict(grid.options)),
+    }
     return Sweep(scene, grid.over, quantity, dataset_of(grid.over, [rows[key] for key in grid.keys], facts))
 
 
@@ -241,10 +245,9 @@ def plan_sweep(
         # in the middle of equal parts: corners are where a grid is at its strangest
         chosen = {left[(2 * k + 1) * len(left) // (2 * _SAMPLE)] for k in range(_SAMPLE)} if left else set()
         seconds = 0.0
-        for key, *what in grid.tasks(set(grid.distinct) - chosen):
-            clock = time.perf_counter()
-            row = compute(*what)
-            seconds += time.perf_counter() - clock
+        for key, changed, _, options in grid.tasks(set(grid.distinct) - chosen):
+            row = compute(changed, quantity, options)
+            seconds += row.seconds
             _keep(kept, key, row)
     return Plan(len(grid.distinct), len(known), seconds / max(len(chosen), 1), len(chosen), _workers(workers, None))
 

@@ -78,7 +78,9 @@ def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Seque
     for axes, (name, values) in zip(np.atleast_1d(row), panels, strict=True):
         handles |= draw(axes, data, dims, name, values, hatches)
     if handles:
-        figure.legend(list(handles.values()), list(handles), loc="outside lower center", frameon=False, fontsize=8.5, ncols=min(3, len(handles)))
+        figure.legend(
+            list(handles.values()), list(handles), loc="outside lower center", frameon=False, fontsize=8.5, ncols=min(3, len(handles))
+        )
     figure.suptitle(sweep.scene.title.replace("$", r"\$"), fontsize=11)
     return save_figure(figure, path)
 
@@ -102,7 +104,9 @@ def _values(data: Any, name: str, dims: tuple[str, ...]) -> Array:
             raise InputError("show", name, f"{variable} has one value a scene: give no place")
         return array.values
     if not place.isdigit() or int(place) >= array.shape[-1]:
-        raise InputError("show", name, f"a place from {variable}.0 to {variable}.{array.shape[-1] - 1} is allowed: it has several values a scene")
+        raise InputError(
+            "show", name, f"{variable} with a place from 0 is allowed, such as {variable}.0: scenes have up to {array.shape[-1]}"
+        )
     return array.values[..., int(place)]
 
 
@@ -111,10 +115,10 @@ def _label(name: str) -> str:
     variable, _, place = name.partition(".")
     if variable in _LABELS:
         return _LABELS[variable]
-    tag, _, quantity = variable.partition("_")
+    tag, _, quantity = ("", "", variable) if variable in _PLACES else variable.partition("_")
     if quantity not in _PLACES:
         return MEANING[variable][1]
-    what = {"limit": "limit point", "fold": "volume fold", "onset": "onset", "state": "equilibrium"}[tag]
+    what = {"": "step", "limit": "limit point", "fold": "volume fold", "onset": "onset", "state": "equilibrium"}[tag]
     return f"{what}{f' {int(place) + 1}' if place else ''}: {_PLACES[quantity]}"
 
 
@@ -178,11 +182,9 @@ def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array) -
         levels = np.arange(low, high + 1)
         shades = ListedColormap(colormaps["cividis"](np.linspace(0.05, 1.0, len(levels))))
         mesh = axes.pcolormesh(x_edges, y_edges, masked, cmap=shades, norm=BoundaryNorm(np.append(levels, high + 1) - 0.5, len(levels)))
-        bar = axes.figure.colorbar(mesh, ax=axes, ticks=levels)
+        axes.figure.colorbar(mesh, ax=axes, ticks=levels).ax.minorticks_off()
     else:
-        mesh = axes.pcolormesh(x_edges, y_edges, masked, cmap="cividis")
-        bar = axes.figure.colorbar(mesh, ax=axes)
-    bar.ax.set_ylabel(_label(name), fontsize=9)
+        axes.figure.colorbar(axes.pcolormesh(x_edges, y_edges, masked, cmap="cividis"), ax=axes)
 
 
 def _hatch(axes: Axes, x_edges: Array, y_edges: Array, reasons: Array, grid: Array, hatches: dict[str, str]) -> dict[str, Any]:
@@ -227,4 +229,3 @@ def _draw_curve(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values:
             x[own], places, linestyle="none", marker=hatches[reason], color="#222222", markerfacecolor="white", markersize=6
         )
     return handles
-

@@ -162,7 +162,7 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
     reasons = _reasons(data, values)[np.ix_(along, up)].T
     axes.set_facecolor("white")
     if np.isfinite(grid).any():
-        _shade(axes, name, x_edges, y_edges, grid)
+        _shade(axes, name, x_edges, y_edges, grid, grid[np.isfinite(grid) & (reasons == "")])
     axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]), xlabel=_key_label(dims[0]), ylabel=_key_label(dims[1]))
     for key, positions, axis in ((dims[0], x, axes.xaxis), (dims[1], y, axes.yaxis)):
         if not _positions(data, key)[1]:
@@ -171,7 +171,8 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
     return _hatch(axes, x_edges, y_edges, reasons, grid, hatches)
 
 
-def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array) -> None:
+def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array, plain: Array) -> None:
+    """Shades that span the plain values: those of a branch that ended early, perhaps far away, have the shade of the end they pass."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -184,7 +185,11 @@ def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array) -
         mesh = axes.pcolormesh(x_edges, y_edges, masked, cmap=shades, norm=BoundaryNorm(np.append(levels, high + 1) - 0.5, len(levels)))
         axes.figure.colorbar(mesh, ax=axes, ticks=levels).ax.minorticks_off()
     else:
-        axes.figure.colorbar(axes.pcolormesh(x_edges, y_edges, masked, cmap="cividis"), ax=axes)
+        known = plain if plain.size else masked.compressed()
+        low, high = known.min(), known.max()
+        extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+        ends = extend[bool(masked.min() < low), bool(masked.max() > high)]
+        axes.figure.colorbar(axes.pcolormesh(x_edges, y_edges, masked, cmap="cividis", vmin=low, vmax=high), ax=axes, extend=ends)
 
 
 def _hatch(axes: Axes, x_edges: Array, y_edges: Array, reasons: Array, grid: Array, hatches: dict[str, str]) -> dict[str, Any]:

@@ -23,7 +23,7 @@ import numpy as np
 
 import femmembrane as fm
 from femmembrane.results.table import write_csv, write_special_points_csv
-from femmembrane.views import plots, vtk
+from femmembrane.views import picture, plots
 
 #: inches of the picture, width and height: 1600 by 760 pixels
 SIZE = (10.0, 4.75)
@@ -74,7 +74,7 @@ def draw_membrane(figure: Any, axes: Any, inflated: fm.Equilibrium, folder: Path
     from matplotlib.colors import Normalize
     from matplotlib.image import imread
 
-    vtk.render(inflated, folder / "membrane.png", quantity="stretch_2", size=(1400, 1300))
+    picture.render(inflated, folder / "membrane.png", quantity="stretch_2", size=(1400, 1300))
     image = imread(folder / "membrane.png")[..., :3]
     image = image[:, : int(0.84 * image.shape[1])]
     coloured = np.ptp(image, axis=2) > 0.1  # the rest of the scale is grey

@@ -15,13 +15,15 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 
 import numpy as np
 
 import femmembrane as fm
+from femmembrane.native import in_numpy, native
 from femmembrane.potential import Potential
 from femmembrane.solve.controls import VolumeControl
-from femmembrane.solve.newton import correct
+from femmembrane.solve.newton import NewtonResult, correct
 from femmembrane.solve.start import spherical_dome
 from femmembrane.stability.zones import find_zones
 
@@ -67,18 +69,22 @@ def run_table(repeat: int) -> dict[str, float]:
 
 
 def trace_table(repeat: int) -> dict[tuple[int, int], float]:
-    """The same branch by arc length, and its error in P against a finer mesh at the same volume."""
+    """The same branch by arc length, compiled and in NumPy, and its error in P against a finer mesh at the same volume."""
     exact = fm.equilibrium(scene(64, 6), volume=75.4, solver="newton").pressure
+    halves = {"NumPy": in_numpy} if native() is None else {"compiled": nullcontext, "NumPy": in_numpy}
     print(f"\nTraced by arc length, V = 0.35 to 75.4                {'points':>8} {'ms each':>8} {'+verdicts':>9} {'error in P':>11}")
     errors = {}
-    for elements, degree in ((32, 2), (64, 2), (8, 6), (16, 4)):
-        plain, judged = scene(elements, degree), scene(elements, degree, BOTH)
-        branch = fm.trace(plain, start=0.35, until={"volume": 75.4}, special_points=False)
-        n = len(branch)
-        t = seconds(lambda s=plain: fm.trace(s, start=0.35, until={"volume": 75.4}, special_points=False), repeat)
-        v = seconds(lambda s=judged: fm.trace(s, start=0.35, until={"volume": 75.4}, special_points=False), repeat)
-        error = errors[elements, degree] = abs(branch[-1].pressure / exact - 1)
-        print(f"  {elements:>4} elements of degree {degree:<28} {n:>8} {t / n * 1e3:>8.2f} {v / n * 1e3:>9.2f} {error:>11.1e}")
+    for elements, degree in ((32, 2), (64, 2), (8, 6), (5, 6), (16, 4)):
+        for name, half in halves.items():
+            plain, judged = scene(elements, degree), scene(elements, degree, BOTH)
+            with half():
+                branch = fm.trace(plain, start=0.35, until={"volume": 75.4}, special_points=False)
+                t = seconds(lambda s=plain: fm.trace(s, start=0.35, until={"volume": 75.4}, special_points=False), repeat)
+                v = seconds(lambda s=judged: fm.trace(s, start=0.35, until={"volume": 75.4}, special_points=False), repeat)
+            n = len(branch)
+            error = errors[elements, degree] = abs(branch[-1].pressure / exact - 1)
+            label = f"{elements:>4} elements of degree {degree}, {name}"
+            print(f"  {label:<52} {n:>8} {t / n * 1e3:>8.2f} {v / n * 1e3:>9.2f} {error:>11.1e}")
     return errors
 
 
@@ -106,8 +112,8 @@ def effects_table(repeat: int) -> None:
 
 
 def growth_table(sizes: Sequence[int], repeat: int) -> None:
-    """Set-up and one equilibrium from a dome against the number of quadratic elements."""
-    print(f"\nGrowth with the mesh (quadratic elements)                    {'set-up s':>10} {'one solve s':>12}")
+    """Set-up and one equilibrium, the next load step of a branch, against the number of quadratic elements."""
+    print(f"\nGrowth with the mesh (quadratic elements)              {'set-up s':>10} {'next step s':>12} {'in NumPy':>10}")
     for elements in sizes:
         asked = scene(elements)
         clock = time.perf_counter()
@@ -115,8 +121,15 @@ def growth_table(sizes: Sequence[int], repeat: int) -> None:
         potential.evaluate(np.zeros(potential.space.n_free), 0.0)
         setup = time.perf_counter() - clock
         dome = spherical_dome(potential, 2.0)
-        solve = seconds(lambda p=potential, x=dome: correct(p, VolumeControl(2.0), x, 1.9, damped=True, max_iterations=30), repeat)
-        print(f"  {elements:>8} elements {setup:>50.3f} {solve:>12.3f}")
+        last = correct(potential, VolumeControl(2.0), dome, 1.9, damped=True, max_iterations=30)
+
+        def step(p: Potential = potential, state: NewtonResult = last) -> NewtonResult:
+            return correct(p, VolumeControl(2.05), state.x, state.pressure)
+
+        times = [seconds(step, repeat)]
+        with in_numpy():
+            times.append(seconds(step, repeat))
+        print(f"  {elements:>8} elements {setup:>44.3f} {times[0]:>12.4f} {times[1]:>10.4f}")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -125,7 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", help="not used: this demo only prints")
     quick = parser.parse_args(arguments).quick
     repeat = 1 if quick else 5
-    print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}")
+    half = "NumPy alone" if native() is None else "compiled"
+    print(f"{platform.processor() or platform.machine()}, {half}, Python {platform.python_version()}, NumPy {np.__version__}")
     fm.inflate(scene(16, stability=BOTH), volumes=[0.5, 1.0])  # imports and first-call costs are not counted
     run_table(repeat)
     errors = trace_table(repeat)

@@ -93,8 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         values = np.array([[v.smallest_eigenvalue for v in run[name]] for run in (found, again)])
         np.testing.assert_allclose(values[0], values[1], rtol=1e-8, atol=1e-9)  # warm or cold, the same verdict
         assert all(a.stable is b.stable for a, b in zip(found[name], again[name], strict=True))
-    # a verdict is no more than a handful of equilibria, whatever the machine
-    assert all(warm[name] < 20 * step for name, _, _ in CLASSES), (warm, step)
+    # whatever the machine: an axisymmetric verdict is a handful of equilibria; waves around the axis, which are not compiled, some dozens
+    assert all(warm[name] < (100 if n else 10) * step for name, _, n in CLASSES), (warm, step)
 
 
 if __name__ == "__main__":

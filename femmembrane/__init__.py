@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
     from .physics.scales import Scales as Scales
+    from .results.citations import cite as cite
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
     from .results.records import Jump as Jump
@@ -39,24 +40,27 @@ if TYPE_CHECKING:
     from .stability.zones import Zone as Zone
     from .stability.zones import Zones as Zones
     from .verbs import Equilibria as Equilibria
-    from .verbs import convergence as convergence
-    from .verbs import cost as cost
     from .verbs import equilibria as equilibria
     from .verbs import equilibrium as equilibrium
     from .verbs import fold_curve as fold_curve
     from .verbs import inflate as inflate
     from .verbs import pressurize as pressurize
     from .verbs import run as run
-    from .verbs import trace as trace
     from .verbs import trace_iter as trace_iter
+    from .verbs.convergence import convergence as convergence
     from .verbs.cost import Cost as Cost
+    from .verbs.cost import cost as cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
     from .verbs.sweep import Sweep as Sweep
     from .verbs.sweep import plan_sweep as plan_sweep
     from .verbs.sweep import sweep as sweep
+    from .verbs.trace import trace as trace
+    from .views.export import export as export
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk
+    from .views.picture import render as render
+    from .views.show import view as view
 
 __version__ = "0.1.0"
 
@@ -68,6 +72,7 @@ _ROOMS = {
     "physics.magnetics": ("Dipole",),
     "physics.materials": ("NeoHookean", "Ogden"),
     "physics.scales": ("Scales",),
+    "results.citations": ("cite",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),
     "solve.continuation": ("StepControl",),
@@ -95,7 +100,10 @@ _ROOMS = {
             "trace_iter",
         ),
     ),
+    "views.export": ("export",),
     "views.modes": ("render_mode", "write_mode_vtk"),
+    "views.picture": ("render",),
+    "views.show": ("view",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 

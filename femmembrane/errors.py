@@ -75,7 +75,7 @@ class InputError(FemmembraneError, ValueError):
 
     def __init__(self, key: str, value: Any, allowed: str) -> None:
         self.key, self.value, self.allowed = key, value, allowed
-        super().__init__(f"{key} = {_shown(value)}: {allowed}")
+        super().__init__(f"{_cut(key)} = {_cut(_shown(value))}: {allowed}")
 
 
 class SolveError(FemmembraneError, RuntimeError):
@@ -93,14 +93,34 @@ class SolveError(FemmembraneError, RuntimeError):
         super().__init__(message)
 
 
+class NotWrittenError(FemmembraneError, OSError):
+    """Results that could not be written: the disk is full, or files may not grow that large.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Names of the files that are missing; the others were written whole.
+    """
+
+    def __init__(self, reason: str, files: Iterable[str]) -> None:
+        self.files = tuple(files)
+        super().__init__(f"{reason}; not written: {', '.join(self.files)}")
+
+
 def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name outside a closed set, with the nearest valid one."""
     known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(str(name)[:80], known, n=1, cutoff=0.5)
     hint = f"unknown; did you mean {near[0]!r}? " if near else "unknown; "
     return InputError(key, name, hint + "known: " + ", ".join(known))
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    try:
+        return repr(value)
+    except ValueError:  # Python does not print whole numbers of more than 4300 digits
+        return "a number of thousands of digits"
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= 80 else text[:77] + "..."

@@ -24,12 +24,14 @@ from numpy.typing import NDArray
 
 from .discretization.space import HESSIAN_PAIRS, Space, space_of
 from .errors import InputError
+from .native import native
 from .physics.kinematics import hencky_strains
 from .physics.loads import volume_density
 from .physics.magnetics import Source, magnetic_energy_density
 from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
+    from ._native import Elements
     from .physics.materials import Material
     from .scene import Scene
 
@@ -56,15 +58,14 @@ class Evaluation:
     stress: Array
     force_density: Array
     stiffness_density: Array
-    space: Space
+    potential: Potential
     _band: Array | None = None
 
     @property
     def band(self) -> Array:
         """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
         if self._band is None:
-            with np.errstate(invalid="ignore"):
-                self._band = self.space.assemble_band(self.stiffness_density)
+            self._band = self.potential.assemble_band(self.stiffness_density)
         return self._band
 
     @property
@@ -137,8 +138,53 @@ class Potential:
     def _kernel(self) -> _Kernel:
         return _Kernel(self.point_function, self.point_data)
 
+    @property
+    def elements(self) -> Elements | None:
+        """The compiled elements of this potential; None where the compiled half is missing, or lacks an operation of the point function."""
+        return None if native() is None else self._elements
+
+    @cached_property
+    def _elements(self) -> Elements | None:
+        module = native()
+        tape = None if module is None else record_tape(self.point_function, module.OPERATIONS)
+        if module is None or tape is None:
+            return None
+        space = self.space
+        field = np.zeros(space.n_free, dtype=np.int64)
+        field[space.fields[1]] = 1
+        n_local = space.gather.shape[0] // 2
+        table, gather = np.ascontiguousarray(space.table), np.ascontiguousarray(space.gather)
+        return module.Elements(tape, self.point_data, gather, table, field, space.n_quadrature, n_local, space.half_bandwidth)
+
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales the magnetic energy."""
+        elements = self.elements
+        if elements is None:
+            return self._evaluate(x, pressure, magnetic)
+        gradients, densities = self.results()
+        values = elements.evaluate(np.ascontiguousarray(x), np.array([pressure, magnetic], dtype=float), gradients, densities)
+        return self.evaluation(x, values, gradients, densities)
+
+    def results(self) -> tuple[Array, Array]:
+        """Room for the gradients (2, n_free) and the densities (20, n_points) that the compiled elements answer with."""
+        return np.empty((2, self.space.n_free)), np.empty((20, self.n_points))
+
+    def evaluation(self, x: Array, values: tuple[float, float, float], gradients: Array, densities: Array) -> Evaluation:
+        """What the compiled elements answer, by names."""
+        stiffness = densities[8:18].reshape(-1, self.space.n_elements)
+        return Evaluation(x, *values, gradients[0], gradients[1], densities[18:], densities[:8], stiffness, self)
+
+    def assemble_band(self, stiffness_density: Array) -> Array:
+        """:meth:`.Space.assemble_band`, compiled where possible."""
+        elements = self.elements
+        if elements is None:
+            with np.errstate(invalid="ignore"):
+                return self.space.assemble_band(stiffness_density)
+        band = np.zeros((self.space.n_free, 3 * self.space.half_bandwidth + 1))
+        elements.assemble(stiffness_density, band)
+        return band.T
+
+    def _evaluate(self, x: Array, pressure: float, magnetic: float) -> Evaluation:
         space, shape = self.space, self._force_shape
         out = self._kernel(space.at_quadrature(x), np.array([pressure, magnetic]))
         with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy NaN is the answer, and the caller's to judge
@@ -146,14 +192,19 @@ class Potential:
             force_density = out[3:11].copy()
             gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
         stiffness_density = out[11:21].reshape(-1, space.n_elements).copy()
-        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, space)
+        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, self)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
         if not self.sources:
             return np.inf
-        space = self.space
-        u, _, w, _ = space.at_quadrature(x).reshape(4, *space.R.shape)
+        space, elements = self.space, self.elements
+        local = np.empty((4, *space.R.shape))
+        if elements is None:
+            local[...] = space.at_quadrature(x).reshape(local.shape)
+        else:
+            elements.at_quadrature(np.ascontiguousarray(x), local)
+        u, _, w, _ = local
         rho, eta, pole = space.R + u, space.Z + w, space.center_height(x)
         return min(math.sqrt(min(s.distance_squared(rho, eta).min(), s.distance_squared(0.0, pole))) for s in self.sources)
 
@@ -331,6 +382,55 @@ def vectorise(function: ca.Function, n: int) -> ca.Function:
             work[target[0]] = ca.MX.binary(operation, work[source[0]], work[source[1]])
     columns = [c if c.numel() == n else ca.repmat(c, n, 1) for c in (outputs[k] for k in range(function.numel_out(0)))]
     return ca.Function(function.name() + "_vector", arguments, [ca.densify(ca.horzcat(*columns))])
+
+
+def record_tape(
+    function: ca.Function, operations: Sequence[str]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, int, int, int, int, int] | None:
+    """The instructions of a scalar function for the compiled half; None when one of them is none of its operations.
+
+    Inputs and output are those of :func:`vectorise`. What depends on constants and on the last input alone is a scalar, numbered -1, -2,
+    ... (constants, the last input, results); the rest are registers with a value for each point, numbered 0, 1, ... (inputs, outputs,
+    CasADi's own work space). An instruction is (operation, target, left, right).
+
+    Returns
+    -------
+    scalar, vector : ndarray of int, shape (n, 4)
+    constants : ndarray
+    n_parameters, n_scalars, n_inputs, n_registers, n_outputs : int
+    """
+    codes = {getattr(ca, f"OP_{name}"): code for code, name in enumerate(operations)}
+    instructions = [
+        (function.instruction_id(k), function.instruction_input(k), function.instruction_output(k))
+        for k in range(function.n_instructions())
+    ]
+    last = function.n_in() - 1
+    first_input = np.cumsum([0, *(function.numel_in(k) for k in range(last))])
+    constants = [function.instruction_constant(k) for k, (operation, _, _) in enumerate(instructions) if operation == ca.OP_CONST]
+    n_scalars, n_inputs = len(constants) + function.numel_in(last), int(first_input[-1])
+    first_work = n_inputs + function.numel_out(0)
+    lists: tuple[list[list[int]], list[list[int]]] = ([], [])
+    work: dict[int, int] = {}
+    known = 0
+    for operation, source, target in instructions:
+        if operation == ca.OP_CONST:
+            known += 1
+            work[target[0]] = -known
+        elif operation == ca.OP_INPUT:
+            work[target[0]] = int(first_input[source[0]]) + source[1] if source[0] < last else -1 - len(constants) - source[1]
+        elif operation == ca.OP_OUTPUT:
+            lists[1].append([operations.index("ASSIGN"), n_inputs + target[1], work[source[0]], work[source[0]]])
+        elif operation in codes:
+            operands = [work[k] for k in source]
+            is_vector = max(operands) >= 0
+            n_scalars += not is_vector
+            work[target[0]] = first_work + target[0] if is_vector else -n_scalars
+            lists[is_vector].append([codes[operation], work[target[0]], operands[0], operands[-1]])
+        else:
+            return None
+    scalar, vector = (np.array(entries, dtype=np.int64).reshape(-1, 4) for entries in lists)
+    sizes = function.numel_in(last), n_scalars, n_inputs, first_work + function.sz_w(), function.numel_out(0)
+    return scalar, vector, np.array(constants), *sizes
 
 
 def potential_of(scene: Scene) -> Potential:

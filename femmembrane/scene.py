@@ -57,6 +57,10 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
 _OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
 
 MAX_DEGREE = 8
+#: size of a scene file: a million elements by their radii; what goes on for ever is none
+MAX_BYTES = 2**25
+#: equilibria of a run, which has to keep them all
+MAX_STEPS = 10**6
 _DEGREE = 2
 _RADIUS_TO_THICKNESS = 1000.0
 _MAX_STEPS = 400
@@ -134,10 +138,10 @@ class Run:
             self,
             start=_optional(_number, "run.start", self.start),
             stop=_optional(_number, "run.stop", self.stop),
-            steps=_optional(_whole, "run.steps", self.steps),
+            steps=None if self.steps is None else _whole("run.steps", self.steps, most=MAX_STEPS),
             values=_optional(_loads, "run.values", self.values),
             until=_optional(_target, "run.until", self.until),
-            max_steps=_whole("run.max_steps", self.max_steps),
+            max_steps=_whole("run.max_steps", self.max_steps, most=MAX_STEPS),
         )
 
     def loads(self) -> NDArray[np.float64]:
@@ -285,7 +289,7 @@ class Scene:
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
             if not finite:
                 height = getattr(source, "height", source)
-                raise InputError(f"{path}.height", height, "the source lies on the membrane, where its field is singular; move it off")
+                raise InputError(f"{path}.height", height, f"{_no_field(height)}; move it")
         if self.sources and self.susceptibility is None:
             raise InputError(
                 "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"
@@ -403,7 +407,11 @@ class Scene:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise InputError("scene", str(path), f"larger than {MAX_BYTES} bytes; the path of a scene file (TOML) is allowed")
+        text = data.decode("utf-8-sig")
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a null character in the path
         if isinstance(error, UnicodeDecodeError):
             line = error.object.count(b"\n", 0, error.start) + 1
@@ -416,7 +424,16 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError("scene", str(path), "not a scene file: nested too deeply") from None
     except ValueError as error:
         where = f"at line {text.rstrip().count(chr(10)) + 1}, the end of the file"
-        raise InputError("scene", str(path), "not valid TOML: " + re.sub("at end of document", where, str(error))) from None
+        reason = re.sub("at end of document", where, str(error))
+        raise InputError("scene", str(path), f"not valid TOML: {reason}{_line(text, reason)}") from None
+
+
+def _line(text: str, reason: str) -> str:
+    """What stands in the line that a parser complains about."""
+    found = re.search(r"at line (\d+)", reason)
+    line = text.replace("\r\n", "\n").split("\n")[int(found[1]) - 1].strip() if found else ""
+    shown = "".join(c if c.isprintable() else "?" for c in line[:60]) + ("..." if len(line) > 60 else "")
+    return f": {shown}" if shown else ""
 
 
 def _known_keys() -> dict[str, set[str]]:
@@ -481,6 +498,12 @@ def _build_sources(tables: Any, scales: Scales | None) -> tuple[Source, ...]:
         except InputError as error:  # a source does not know its place in the list
             raise InputError(re.sub(r"^source(?=\.)", path, error.key), error.value, error.allowed) from None
     return tuple(sources)
+
+
+def _no_field(height: Any) -> str:
+    if isinstance(height, float) and abs(height) > 1:
+        return "the source is too far away for its field to be a number"
+    return "the source lies on the membrane, where its field is singular"
 
 
 def _source_path(index: int, count: int) -> str:

@@ -11,3 +11,11 @@ def silent(capfd):
     yield
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Slow tests are left out unless -m says something."""
+    if not config.getoption("-m"):
+        slow = [item for item in items if item.get_closest_marker("slow")]
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if item not in slow]

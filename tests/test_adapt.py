@@ -363,7 +363,7 @@ def test_command_whose_accuracy_is_not_met(tmp_path, capfd, monkeypatch):
 
 
 def test_an_interrupted_run_keeps_its_mesh(branch):
-    from femmembrane.cli import partial_branch
+    from femmembrane.cli.run import partial_branch
 
     kept = partial_branch(asking(ABOVE, 1e-6), branch[:2], fm.Status.INTERRUPTED, "interrupted")
     assert kept.scene == branch.scene

@@ -173,8 +173,11 @@ def stand_in(monkeypatch):
         return [Path(directory) / "branch.csv"]
 
     def install(run, write=write_run):
-        monkeypatch.setitem(sys.modules, "femmembrane.verbs", types.SimpleNamespace(run=run))
-        monkeypatch.setitem(sys.modules, "femmembrane.results.output", types.SimpleNamespace(write_run=write))
+        def observed(scene, on_step, on_checkpoint, unfinished):
+            return run(scene, on_step)
+
+        monkeypatch.setitem(sys.modules, "femmembrane.verbs", types.SimpleNamespace(run=observed))
+        monkeypatch.setitem(sys.modules, "femmembrane.results.output", types.SimpleNamespace(write_run=write, clean=lambda folder: None))
         return written
 
     return install
@@ -222,6 +225,21 @@ def test_progress_on_a_terminal(stand_in, tmp_path, capsys, monkeypatch):
     assert said.out == ""
     assert "3/60" in said.err
     assert "P = 1.5" in said.err
+
+
+def test_progress_by_arc_length_promises_no_end(stand_in, tmp_path, capsys, monkeypatch):
+    """How many steps there will be is not known; how far there is to go is."""
+    traced = tmp_path / "traced.toml"
+    scene = Scene.from_toml(DEMO).replace(analysis=type(Scene.from_toml(DEMO).analysis)())
+    scene.replace(run=type(scene.run)(control="arc-length", start=0.5, until={"center_height": 5.2})).to_toml(traced)
+    stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 3)), write=lambda *a, **k: [])
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    assert cli.main(["run", str(traced), "--out", str(tmp_path)]) == cli.DONE
+    said = capsys.readouterr().err
+    assert "step 3, center height 0.5 until 5.2" in said
+    assert "3/60" not in said
 
 
 def test_not_converged_keeps_what_was_computed(stand_in, tmp_path, capsys):
@@ -311,7 +329,7 @@ def test_disk_full(stand_in, tmp_path, capsys):
         raise OSError(28, "No space left on device")
 
     stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 2)), write)
-    assert main(tmp_path) == cli.BAD_INPUT
+    assert main(tmp_path) == cli.NOT_WRITTEN
     said = capsys.readouterr()
     assert is_one_message(said.err)
     assert "No space left on device" in said.err

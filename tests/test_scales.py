@@ -18,7 +18,7 @@ from femmembrane.physics.scales import UNITS
 from femmembrane.potential import potential_of
 from femmembrane.results import table
 from femmembrane.solve.parameter import Parameter
-from femmembrane.views import vtk
+from femmembrane.views import picture
 
 from .cases import OGDEN, disc_scene
 
@@ -417,10 +417,10 @@ def test_surfaces(bare, scaled, tmp_path):
 
 
 def test_rendered(bare, scaled, tmp_path):
-    vtk.render(scaled, tmp_path / "stress.png", quantity="total_stress_1_pa", size=(200, 150))
+    picture.render(scaled, tmp_path / "stress.png", quantity="total_stress_1_pa", size=(200, 150))
     assert (tmp_path / "stress.png").stat().st_size > 0
     with pytest.raises(InputError, match="total_stress_1_pa") as caught:
-        vtk.render(bare, tmp_path / "none.png", quantity="total_stress_1_pa")
+        picture.render(bare, tmp_path / "none.png", quantity="total_stress_1_pa")
     assert "_pa" not in caught.value.allowed
 
 

@@ -17,7 +17,7 @@ from femmembrane.results.records import Branch, Equilibrium, Jump, SpecialPoint
 from femmembrane.scene import Analysis, Scene
 from femmembrane.stability.verdict import Verdict
 from femmembrane.verbs import inflate
-from femmembrane.views import plots, vtk, zones
+from femmembrane.views import picture, plots, vtk, zones
 
 pyvista = pytest.importorskip("pyvista")
 
@@ -159,7 +159,7 @@ def test_names_that_are_refused(branch: Branch, tmp_path: Path) -> None:
 def test_render(branch: Branch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     from matplotlib.image import imread
 
-    vtk.render(branch, tmp_path / "membrane.png", size=(400, 300))
+    picture.render(branch, tmp_path / "membrane.png", size=(400, 300))
     image = imread(tmp_path / "membrane.png")[..., :3]
     assert image.shape == (300, 400, 3)
     assert image.std() > 0.05
@@ -171,9 +171,9 @@ def test_render(branch: Branch, tmp_path: Path, capfd: pytest.CaptureFixture[str
 
 def test_render_refuses(branch: Branch, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="stretch_1"):
-        vtk.render(branch[0], tmp_path / "membrane.png", quantity="strech_1")
+        picture.render(branch[0], tmp_path / "membrane.png", quantity="strech_1")
     with pytest.raises(InputError, match="one or more equilibria"):
-        vtk.render(branch[:0], tmp_path / "membrane.png")
+        picture.render(branch[:0], tmp_path / "membrane.png")
 
 
 # --- plots

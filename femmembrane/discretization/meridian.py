@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..physics.magnetics import is_number
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 ELEMENTS = 64
 #: relative accuracies that a mesh may be chosen for: round-off ends what is below
 LEAST_ACCURACY, MOST_ACCURACY = 0.1, 1e-12
+#: a hundred times more than a large machine has room for
+MAX_ELEMENTS = 10**8
 #: ratios of sizes reach from one over this to this: beyond, the smallest elements drown in round-off
 MAX_RATIO = 1e6
 
@@ -102,8 +104,8 @@ class Disc:
         radii = None if self.radii is None else _radii(self.radii)
         follows = ELEMENTS if radii is None else len(radii) - 1
         elements = follows if self.elements is None else self.elements
-        if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)) or elements < 1:
-            raise InputError("mesh.elements", elements, "a whole number >= 1 is allowed")
+        if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)) or not 1 <= elements <= MAX_ELEMENTS:
+            raise InputError("mesh.elements", elements, f"a whole number >= 1 (and <= {MAX_ELEMENTS}) is allowed")
         if radii is not None and elements != follows:
             raise InputError("mesh.elements", elements, f"it contradicts mesh.radii, the ends of {follows}; leave elements out")
         if radii is not None and ratio != 1:
@@ -198,12 +200,12 @@ def _check_accuracy(mesh: Disc) -> None:
 
 
 def _positive(key: str, value: Any, least: float, most: float, what: str) -> None:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not least <= float(value) <= most:
+    if not (is_number(value) and least <= float(value) <= most):
         raise InputError(key, value, f"a number from {least:g} to {most:g} is allowed{what}")
 
 
 def _ratio(value: Any) -> float:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 1 / MAX_RATIO <= float(value) <= MAX_RATIO:
+    if not (is_number(value) and 1 / MAX_RATIO <= float(value) <= MAX_RATIO):
         allowed = f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed (size at the rim over size at the pole)"
         raise InputError("mesh.ratio", value, allowed)
     return float(value)
@@ -218,7 +220,7 @@ def _radii(values: Any) -> tuple[float, ...]:
     except TypeError:
         raise InputError("mesh.radii", values, allowed) from None
     for k, end in enumerate(ends):
-        if isinstance(end, (bool, np.bool_)) or not isinstance(end, Real) or not math.isfinite(end):
+        if not is_number(end):
             raise InputError(f"mesh.radii[{k}]", end, "a finite number is allowed")
     if len(ends) < 2 or ends[0] != 0 or ends[-1] != 1:
         raise InputError("mesh.radii", ends, allowed)

@@ -15,6 +15,7 @@ from numbers import Real
 from typing import Any, Protocol
 
 from ..errors import InputError
+from .outline import Outline
 
 
 class Source(Protocol):
@@ -82,6 +83,10 @@ class Dipole:
 
     def passed(self, before: float, after: float) -> bool:
         return (before - self.height) * (after - self.height) <= 0
+
+    def outline(self) -> Outline:
+        """A point with an arrow along its moment."""
+        return Outline(f"dipole at height {self.height:g}", ((0.0, self.height),), self.orientation)
 
 
 def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any]:

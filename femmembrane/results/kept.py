@@ -62,9 +62,18 @@ class Kept:
         return None if found is None else json.loads(found[0])
 
     def put(self, key: str, value: dict[str, Any]) -> None:
-        """Keep a value."""
+        """Keep a value.
+
+        Raises
+        ------
+        InputError
+            When it cannot be written; what was kept before is still there.
+        """
         text = json.dumps(value, default=_plain)
-        self._file.execute("INSERT OR REPLACE INTO scene VALUES (?, ?)", (key, text))
+        try:
+            self._file.execute("INSERT OR REPLACE INTO scene VALUES (?, ?)", (key, text))
+        except sqlite3.Error as error:
+            raise InputError("out", str(self.path.parent), f"a folder with room for the results is needed ({error})") from None
 
 
 def _plain(value: Any) -> Any:

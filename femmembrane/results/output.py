@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
-from collections.abc import Sequence
+import re
+import tempfile
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import InputError, NotWrittenError
+from ..native import native
 from .store import package_version, replace_file, save
 from .table import write_csv, write_special_points_csv, write_zones_csv
 
@@ -24,10 +29,11 @@ NOTED_VERSIONS = ("femmembrane", "numpy", "scipy", "scikit-fem", "casadi")
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:
     """Write everything that is known of a branch to a folder.
 
-    ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), ``zones.csv`` and ``zones.png`` (when the scene asks for
-    wrinkling), ``run.json``, ``branch.nc``, ``pressure-volume.png`` and, last, ``membrane.pvd`` with one VTU file an equilibrium in
-    ``membrane/``. Every file is written whole or not at all. A branch without equilibria leaves ``run.json`` and tables without rows. Files
-    of an earlier run in the same folder that this run does not write are removed, so that the folder speaks of one run only.
+    ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), ``zones.csv`` and ``zones.png`` (when the
+    scene asks for wrinkling), ``pressure-volume.png``, ``membrane.pvd`` with one VTU file an equilibrium in ``membrane/`` and, last,
+    ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without equilibria leaves
+    ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write are removed, so that the
+    folder speaks of one run only.
 
     Parameters
     ----------
@@ -45,57 +51,100 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     ------
     InputError
         When the folder cannot be made or written to.
+    NotWrittenError
+        When some files could not be written (a full disk); all others were.
     """
-    folder = _writable(Path(directory))
-    files = {name: folder / name for name in _names(branch)}
-    for stale in set(_ALL) - set(files):
-        (folder / stale).unlink(missing_ok=True)
-    write_csv(branch, files["branch.csv"])
-    if "special_points.csv" in files:
-        write_special_points_csv(branch, files["special_points.csv"])
-    if "zones.csv" in files:
-        write_zones_csv(branch, files["zones.csv"])
-    _write_json(_facts(branch, command), files["run.json"])
-    from ..views.plots import plot_pressure_volume, plot_zones
-    from ..views.vtk import remove_surfaces, write_vtk
+    from ..views.vtk import remove_surfaces
 
-    if len(branch):
-        save(branch, files["branch.nc"])
-        plot_pressure_volume(branch, files["pressure-volume.png"])
-        if "zones.png" in files:
-            plot_zones(branch, files["zones.png"])
-        write_vtk(branch, files["membrane.pvd"])
-    else:
-        remove_surfaces(folder / "membrane.pvd")
-    return list(files.values())
+    folder = _writable(Path(directory))
+    writers = _writers(branch, command)
+    for stale in {*_ALL, RECORD} - (writers.keys() - {RECORD}):
+        (folder / stale).unlink(missing_ok=True)
+    if SURFACES not in writers:
+        remove_surfaces(folder / SURFACES)
+    failed: dict[str, OSError] = {}
+    for name in sorted(writers, key=_WRITTEN.index):
+        if name == RECORD and failed:
+            break
+        try:
+            writers[name](folder / name)
+        except OSError as error:
+            failed[name] = error
+            _drop(folder / name)
+    if failed:
+        first = next(iter(failed.values()))
+        raise NotWrittenError(first.strerror or str(first), failed) from first
+    return [folder / name for name in _ALL if name in writers]
+
+
+def clean(folder: Path) -> None:
+    """Remove what a killed run may have left: files that were still to take their places, under names that only :mod:`.store` makes."""
+    for path in (*folder.iterdir(), *folder.glob("membrane/.*")):
+        match = re.fullmatch(r"\.(.+)\.[0-9a-f]{8}(\.\w+)", path.name)
+        if match and ((match[1] + match[2]) in _OURS or re.fullmatch(r"membrane_\d{4,}\.vtu", match[1] + match[2])):
+            path.unlink()
+
+
+def read_record(folder: Path) -> dict[str, Any] | None:
+    """``run.json`` of a folder that a run has completed, None without one that can be read."""
+    try:
+        facts = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return facts if isinstance(facts, dict) and facts.keys() >= {"scene", "status", "message", "equilibria"} else None
 
 
 _ALL = (
     *("branch.csv", "special_points.csv", "zones.csv", "run.json"),
     *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
+    "report.html",  # written from the rest, by whom it is asked for
 )
 
 
-def _names(branch: Branch) -> list[str]:
-    """The files that this branch gets, in the order of writing."""
-    absent = set() if len(branch) else {"branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"}
-    if not branch.scene.analysis.wrinkling:
-        absent |= {"zones.csv", "zones.png"}
-    if branch.special_points is None:
-        absent.add("special_points.csv")
-    return [name for name in _ALL if name not in absent]
+RECORD, SURFACES = "run.json", "membrane.pvd"
+#: what holds most in the least room first; the record makes the folder complete
+_WRITTEN = ("branch.nc", *(name for name in _ALL if name not in ("branch.nc", RECORD)), RECORD)
+_OURS = {*_ALL, "checkpoint.nc", *(f"{study}.{kind}" for study in ("convergence", "cost") for kind in ("csv", "png"))}
+
+
+def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Callable[[Path], object]]:
+    """How each file that this branch gets is written."""
+    from ..views.plots import plot_pressure_volume, plot_zones
+    from ..views.vtk import write_vtk
+
+    writers: dict[str, Callable[[Path], object]] = {"branch.csv": partial(write_csv, branch)}
+    if branch.special_points is not None:
+        writers["special_points.csv"] = partial(write_special_points_csv, branch)
+    if branch.scene.analysis.wrinkling:
+        writers["zones.csv"] = partial(write_zones_csv, branch)
+    if len(branch):
+        writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(plot_pressure_volume, branch)}
+        writers[SURFACES] = partial(write_vtk, branch)
+        if branch.scene.analysis.wrinkling:
+            writers["zones.png"] = partial(plot_zones, branch)
+    writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
+    return writers
+
+
+def _drop(path: Path) -> None:
+    """Remove a file of an earlier run that this run could not replace."""
+    from ..views.vtk import remove_surfaces
+
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
+        if path.name == SURFACES:
+            remove_surfaces(path)
 
 
 def _writable(folder: Path) -> Path:
     """Make the folder and try it, before anything is computed from the branch."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with replace_file(folder / ".writable") as probe:
-            probe.touch()
-        (folder / ".writable").unlink()
-    except (OSError, InputError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it cannot be written to"
-        raise InputError("--out", str(folder), f"a folder that can be made and written to is needed ({reason})") from error
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        allowed = f"a folder that can be made and written to is needed ({error.strerror})"
+        raise InputError("--out", str(folder), allowed) from error
     return folder
 
 
@@ -110,6 +159,7 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
         "equilibria": len(branch),
         "special_points": None if branch.special_points is None else len(branch.special_points),
         "timings": {stage: float(seconds) for stage, seconds in branch.timings.items()},
+        "compiled": native() is not None if not len(branch) else branch[0].potential.elements is not None,
         "versions": {"python": platform.python_version(), **{name: package_version(name) for name in NOTED_VERSIONS}},
         "platform": platform.platform(),
         "processors": os.cpu_count(),

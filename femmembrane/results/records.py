@@ -223,6 +223,12 @@ class Equilibrium:
             self._errors[control] = estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
         return self._errors[control]
 
+    def _repr_html_(self) -> str:
+        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        from ..views.notebook import equilibrium_html
+
+        return equilibrium_html(self)
+
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
@@ -250,26 +256,39 @@ class SpecialPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class TraceMemory:
-    """What the next step of a trace depends on, so that an interrupted one goes on as if it had not been.
+class PathMemory:
+    """What the next equilibrium of a run depends on besides the last one, so that an interrupted run goes on as if it had not been.
 
     Attributes
     ----------
     sigma : tuple of float
-        Arc length at the last two points (one at the very start).
+        Load (in a trace: arc length) at the last points that predict the next one, two at most.
     points, slopes : ndarray, shape (len(sigma), n_free + 1)
-        (x, P) and its unit tangent there.
-    step : float
-        Length of the next step.
-    regular : int
-        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
+        (x, P) and its derivative with respect to sigma there.
     """
 
     sigma: tuple[float, ...]
     points: Array
     slopes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TraceMemory(PathMemory):
+    """The same for a trace by arc length.
+
+    Attributes
+    ----------
+    step : float
+        Length of the next step.
+    regular : int
+        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
+    unexplained : tuple of str
+        Changes of inertia met so far at which no special point was located.
+    """
+
     step: float
     regular: int
+    unexplained: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,9 +322,11 @@ class Branch(Sequence[Equilibrium]):
     timings : mapping of str to float
         Seconds by stage.
     special_points : tuple of SpecialPoint, or None when none were looked for
-    memory : TraceMemory, or None for a branch that was not traced by arc length
+    memory : TraceMemory for a branch traced by arc length, PathMemory for an unfinished run by loads, else None
     jumps : tuple of Jump
         Where a run snapped because the branch turned back before a load.
+    solver : str
+        Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     """
 
     scene: Scene
@@ -314,8 +335,9 @@ class Branch(Sequence[Equilibrium]):
     message: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
     special_points: tuple[SpecialPoint, ...] | None = None
-    memory: TraceMemory | None = field(default=None, repr=False)
+    memory: PathMemory | None = field(default=None, repr=False)
     jumps: tuple[Jump, ...] = ()
+    solver: str = ""
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -424,6 +446,24 @@ class Branch(Sequence[Equilibrium]):
         from ..views.plots import plot_pressure_volume
 
         return plot_pressure_volume(self, path)
+
+    def report(self, path: str | PathLike[str]) -> None:
+        """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings."""
+        from ..views.report import write_report
+
+        write_report(self, path)
+
+    def cite(self) -> str:
+        """BibTeX of what the computation used."""
+        from .citations import cite
+
+        return cite(self)
+
+    def _repr_html_(self) -> str:
+        """The table and the pressure-volume diagram, for notebooks."""
+        from ..views.notebook import branch_html
+
+        return branch_html(self)
 
 
 def _radii(r: ArrayLike, ends: Array) -> Array:

@@ -7,6 +7,7 @@ the one that was saved; everything else in the file can be read without this pac
 
 from __future__ import annotations
 
+import io
 import json
 import secrets
 import tomllib
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from ..accuracy.error_estimate import ErrorEstimate
     from ..scene import Scene
     from ..stability.verdict import Verdict
-    from .records import Branch, Equilibrium, Jump, SpecialPoint, TraceMemory
+    from .records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 
 FORMAT = 1
 
@@ -63,9 +64,9 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "kind": ("kind of the special point", "1"),
     "error": ("uncertainty of the special point's location", "1"),
     "azimuthal": ("number of waves around the axis of the instability that sets in", "1"),
-    "trace_sigma": ("arc length at the last points of the trace", "1"),
-    "trace_point": ("state and pressure at the last points of the trace", "1"),
-    "trace_slope": ("their derivatives with respect to arc length", "1"),
+    "trace_sigma": ("arc length, or load, at the last points of the path", "1"),
+    "trace_point": ("state and pressure at the last points of the path", "1"),
+    "trace_slope": ("their derivatives with respect to arc length or load", "1"),
     "jump_index": ("number of the equilibrium that a snap of the membrane landed on", "1"),
     "jump_limit": ("whether the fold before the snap was located", "1"),
     "fraction_taut": ("part of the reference area that is taut", "1"),
@@ -167,8 +168,10 @@ def save(branch: Branch, path: str | PathLike[str]) -> None:
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }
+    image = io.BytesIO()  # HDF5 itself does not survive a full disk: it is met here, by one plain write
+    dataset.to_netcdf(image, engine="h5netcdf", encoding=encoding)
     with replace_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+        temporary.write_bytes(image.getbuffer())
 
 
 def load(path: str | PathLike[str]) -> Branch:
@@ -340,10 +343,20 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "format": FORMAT,
         "status": branch.status.value,
         "message": branch.message,
+        **({"solver": branch.solver} if branch.solver else {}),
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
-        **({"trace_step": branch.memory.step, "trace_regular": branch.memory.regular} if branch.memory is not None else {}),
+        **_trace_attributes(branch.memory),
     }
+
+
+def _trace_attributes(memory: PathMemory | None) -> dict[str, Any]:
+    from .records import TraceMemory
+
+    if not isinstance(memory, TraceMemory):
+        return {}
+    unexplained = {"trace_unexplained": json.dumps(memory.unexplained)} if memory.unexplained else {}
+    return {"trace_step": memory.step, "trace_regular": memory.regular, **unexplained}
 
 
 def _read(path: str | PathLike[str]) -> xarray.Dataset:
@@ -380,6 +393,7 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
         timings=json.loads(dataset.attrs["timings"]),
         memory=_memory(dataset),
         jumps=_jumps(dataset, scene, equilibria),
+        solver=str(dataset.attrs.get("solver", "")),  # younger than the format
     )
 
 
@@ -397,14 +411,17 @@ def _special_points(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple
     )
 
 
-def _memory(dataset: xarray.Dataset) -> TraceMemory | None:
-    from .records import TraceMemory
+def _memory(dataset: xarray.Dataset) -> PathMemory | None:
+    from .records import PathMemory, TraceMemory
 
     if "trace_sigma" not in dataset:
         return None
     points, slopes = (np.array(dataset[name].values, dtype=np.float64) for name in ("trace_point", "trace_slope"))
     sigma = tuple(dataset["trace_sigma"].values.tolist())
-    return TraceMemory(sigma, points, slopes, float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"]))
+    if "trace_step" not in dataset.attrs:
+        return PathMemory(sigma, points, slopes)
+    unexplained = tuple(json.loads(dataset.attrs.get("trace_unexplained", "[]")))
+    return TraceMemory(sigma, points, slopes, float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"]), unexplained)
 
 
 def _jumps(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:

@@ -6,6 +6,7 @@ squared pressure), so that a step means the same on every mesh.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -101,7 +102,7 @@ def trace_points(potential: Potential, point: BranchPoint, tracer: Tracer) -> It
                 )
         new.state.iterations = spent
         tracer.path.append(new.sigma, new.state.x, new.state.pressure, new.tangent, new.tangent_pressure)
-        tracer.step = float(np.clip(tracer.step * np.clip(quality, 0.5, 2.0), control.smallest, control.largest))
+        tracer.step = min(max(tracer.step * min(max(quality, 0.5), 2.0), control.smallest), control.largest)
         point = new
         yield new
 
@@ -113,7 +114,7 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     result = correct(potential, ArcLengthControl(point.dual, point.tangent_pressure, x, p), x, p)
     if result.status is not Status.CONVERGED:
         return None, result.iterations, 0.5
-    miss = np.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
+    miss = math.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
     state = State.of(result)
     if potential.passed_source(point.state.x, state.x):
         return None, result.iterations, 0.5
@@ -122,13 +123,14 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     if new is None:
         return None, result.iterations, 0.5
     cosine = float(point.dual @ new.tangent + point.tangent_pressure * new.tangent_pressure)
-    angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    angle = math.acos(min(max(cosine, -1.0), 1.0))
     if angle > 2 * control.turn or miss > 50 * control.deviation:
         return None, result.iterations, 0.5
-    chord = np.sqrt(_square(potential, state.x - point.state.x, state.pressure - point.state.pressure))
-    new.sigma = point.sigma + float(chord / np.sinc(angle / (2 * np.pi)))  # of the circle through both points with these tangents
+    chord = math.sqrt(_square(potential, state.x - point.state.x, state.pressure - point.state.pressure))
+    half = angle / 2
+    new.sigma = point.sigma + chord * (half / math.sin(half) if half else 1.0)  # of the circle through both points with these tangents
     quality = min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))
-    return new, result.iterations, float(quality)
+    return new, result.iterations, quality
 
 
 def oriented_point(potential: Potential, state: State, sigma: float, tangent: Array, tangent_pressure: float) -> BranchPoint:
@@ -144,9 +146,9 @@ def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> Br
 
 
 def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
-    dual = _dual(potential, tangent)
-    size = np.sqrt(tangent @ dual + tp * tp)
-    return BranchPoint(state, sigma, tangent / size, float(tp / size), dual / size)
+    size = math.sqrt(tangent @ _dual(potential, tangent) + tp * tp)
+    # not the dual over the size, which differs in the last bit: a resumed trace knows the unit tangent alone
+    return oriented_point(potential, state, sigma, tangent / size, tp / size)
 
 
 def _dual(potential: Potential, tangent: Array) -> Array:

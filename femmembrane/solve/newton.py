@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
-from .banded import BandFactor, BorderedFactor
+from .banded import BandFactor, BorderedFactor, CompiledBorder
 from .controls import ArcLengthControl, Control
+
+if TYPE_CHECKING:
+    from .._native import Elements
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
@@ -28,7 +32,7 @@ class NewtonResult:
     x: Array
     pressure: float
     evaluation: Evaluation
-    bordered: BorderedFactor | None
+    bordered: BorderedFactor | CompiledBorder | None
     iterations: int
     correction: float
     residual: float
@@ -66,6 +70,9 @@ def correct(
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
         foretold from two corrections in quadratic convergence and confirmed by the residual at x.
     """
+    elements = None if damped else potential.elements
+    if elements is not None:
+        return _compiled(elements, potential, control, x, pressure, magnetic, tolerance, max_iterations)
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration = np.inf, 0
     while True:
@@ -93,6 +100,29 @@ def correct(
         previous = size
 
 
+def _compiled(
+    elements: Elements,
+    potential: Potential,
+    control: Control,
+    x: Array,
+    pressure: float,
+    magnetic: float,
+    tolerance: float,
+    max_iterations: int,
+) -> NewtonResult:
+    """:func:`correct`, undamped, in the compiled half."""
+    gradients, densities = potential.results()
+    x, parameters = x.copy(), np.array([pressure, magnetic], dtype=float)
+    numbers = control.numbers(potential.space)
+    converged, pressure, elastic, magnetic, volume, iterations, correction, residual, gap, border = elements.correct(
+        numbers, x, parameters, tolerance, RESIDUAL, max_iterations, gradients, densities
+    )
+    evaluation = potential.evaluation(x, (elastic, magnetic, volume), gradients, densities)
+    bordered = None if border is None else CompiledBorder(border)
+    status = Status.CONVERGED if converged else Status.NOT_CONVERGED
+    return NewtonResult(x, pressure, evaluation, bordered, iterations, correction, residual, gap, status)
+
+
 class Equations:
     """Residuals and bordered factors at one state."""
 
@@ -103,7 +133,7 @@ class Equations:
         x: Array,
         pressure: float,
         evaluation: Evaluation,
-        bordered: BorderedFactor | None = None,
+        bordered: BorderedFactor | CompiledBorder | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
@@ -129,7 +159,7 @@ class Equations:
         return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, residual, self.gap, status)
 
     @property
-    def _factored(self) -> BorderedFactor:
+    def _factored(self) -> BorderedFactor | CompiledBorder:
         if self.bordered is None:
             raise ArithmeticError("no factors where the energy is undefined")
         return self.bordered
@@ -160,10 +190,10 @@ def relative_size(potential: Potential, dx: Array, x: Array) -> float:
     largest = 0.0
     for index in potential.space.fields:
         c = float(change[index].max(initial=0.0))  # NaN propagates
+        if not c < np.inf:
+            return np.inf
         if c > 0:
             largest = max(largest, c / max(float(size[index].max()), c))
-        elif c != 0:
-            return np.inf
     return largest
 
 

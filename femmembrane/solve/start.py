@@ -35,7 +35,7 @@ def spherical_dome(potential: Potential, volume: float) -> Array:
     """
     space = potential.space
     s = space.interpolation_points()
-    height = 2 * np.sinh(np.arcsinh(3 * volume / np.pi) / 3)
+    height = 2 * np.sinh(np.arcsinh(volume * (3 / np.pi)) / 3)
     if height == 0:
         return np.zeros(space.n_free)
     radius = (1 + height**2) / (2 * height)
@@ -83,7 +83,9 @@ def start_at_volume(potential: Potential, volume: float) -> State:
 
 def _inflated(potential: Potential, volume: float) -> State:
     """Equilibrium without sources."""
-    result = correct(potential, VolumeControl(volume), spherical_dome(potential, volume), 0.0, magnetic=0.0, damped=True, max_iterations=40)
+    with np.errstate(over="ignore", invalid="ignore"):  # a dome may be too large or small for its energy to be a number: not converged
+        dome = spherical_dome(potential, volume)
+        result = correct(potential, VolumeControl(volume), dome, 0.0, magnetic=0.0, damped=True, max_iterations=40)
     if result.status is Status.CONVERGED:
         return State.of(result)
     bad = ill_posed(potential, result.evaluation)

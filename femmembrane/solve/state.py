@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
-from .banded import BandFactor, band_product
+from .banded import BandFactor, band_inner
 from .newton import NewtonResult
 
 
@@ -51,8 +51,7 @@ class State:
 
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:
     """Mesh-independent inner product of (x, P) and (y, Q): mean over the reference area of the displacements, plus P Q."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a prediction may be absurd; whoever asked sees it by the size
-        return float(x @ band_product(potential.mass, potential.space.half_bandwidth, y)) / potential.area + p * q
+    return band_inner(potential.mass, potential.space.half_bandwidth, x, y) / potential.area + p * q
 
 
 def distance(potential: Potential, x: Array, y: Array) -> float:
@@ -71,8 +70,8 @@ class Path:
 
     def append(self, sigma: float, x: Array, pressure: float, dx: Array, dp: float) -> None:
         self.sigma.append(sigma)
-        self.point.append(np.append(x, pressure))
-        self.slope.append(np.append(dx, dp))
+        self.point.append(_joined(x, pressure))
+        self.slope.append(_joined(dx, dp))
         for memory in (self.sigma, self.point, self.slope):
             del memory[:-2]
 
@@ -86,7 +85,14 @@ class Path:
         return z[:-1], float(z[-1])
 
 
+def _joined(x: Array, last: float) -> Array:
+    z = np.empty(len(x) + 1)
+    z[:-1], z[-1] = x, last
+    return z
+
+
 def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float) -> Array:
-    """Cubic with values and slopes at t = 0 and t = 1; extrapolates beyond. Written about b, the newer point."""
-    rise, back = b - a, t - 1
-    return b + back * (slope_b + back * ((2 * slope_b + slope_a - 3 * rise) + back * (slope_b + slope_a - 2 * rise)))
+    """Cubic with values and slopes at t = 0 and t = 1; extrapolates beyond."""
+    back = t - 1
+    at_a = (1 + 2 * t) * back * back
+    return at_a * a + (t * back * back) * slope_a + (1 - at_a) * b + (t * t * back) * slope_b

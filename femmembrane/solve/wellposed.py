@@ -45,6 +45,8 @@ class IllPosed:
 def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation is ill-posed; None where it is nowhere."""
     slack = potential.scene.tension_field
+    if not slack and evaluation.stress[0].min(initial=0.0) >= 0:  # the usual case needs no scale
+        return None
     scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
     r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
     if slack:

@@ -11,15 +11,19 @@ lower bound decide.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from ..native import native
 from ..potential import Array
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
 
 #: a gap below the eigenvalue found, relative to it, in which inertia must find nothing
 _GAP = 1e-4
+#: Rayleigh quotient iterations before Lanczos iterations are tried
+_ITERATIONS = 8
 
 
 @dataclass(frozen=True)
@@ -66,8 +70,8 @@ def smallest_eigenvalue(
         raise SpectrumError("one unknown under one constraint leaves nothing to perturb")
     pencil = Pencil(band, mass, half_bandwidth, constraint, compliance)
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
-    found = pencil.rayleigh(start)
-    if found is None or pencil.below(*found[:2]) > 0:
+    found = pencil.proved(start)
+    if found is None:
         found = pencil.lanczos()
         if pencil.below(*found[:2]) > 0:
             raise SpectrumError("the eigenvalue found could not be proved to be the smallest")
@@ -85,7 +89,11 @@ class Pencil:
     def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float) -> None:
         self.band, self.mass, self.kd, self.constraint, self.compliance = band, mass, kd, constraint, compliance
         self.n = int(band.shape[1])
-        self.scale = float(np.abs(band[2 * kd] / mass[2 * kd]).max())
+
+    @cached_property
+    def scale(self) -> float:
+        """Eigenvalue of waves as short as an element, in size."""
+        return float(np.abs(self.band[2 * self.kd] / self.mass[2 * self.kd]).max())
 
     def noise(self, mode: Array) -> tuple[float, float]:
         """What cancels in the Rayleigh quotient of a normalised mode and in the size of its residual; times round-off, their noise.
@@ -128,7 +136,21 @@ class Pencil:
             mode, right = self.normalised(self.solve(solver, right))
         return mode
 
-    def rayleigh(self, mode: Array, iterations: int = 8) -> tuple[float, Array, float] | None:
+    def proved(self, guess: Array) -> tuple[float, Array, float] | None:
+        """What :meth:`rayleigh` finds from a guess, if nothing lies below."""
+        module = native()
+        if module is None:
+            found = self.rayleigh(guess)
+            return None if found is None or self.below(*found[:2]) > 0 else found
+        mode = np.array(guess, dtype=float)
+        band, mass = np.ascontiguousarray(self.band.T), np.ascontiguousarray(self.mass.T)
+        answer = module.rayleigh(band, mass, self.constraint, self.n, self.kd, self.compliance, mode, _ITERATIONS, _GAP)
+        if answer is None:
+            return None
+        value, error, below = answer  # below is negative where the signs of pivots are in doubt
+        return None if below > 0 or (below < 0 and self.below(value, mode) > 0) else (value, mode, error)
+
+    def rayleigh(self, mode: Array, iterations: int = _ITERATIONS) -> tuple[float, Array, float] | None:
         best = np.inf
         for _ in range(iterations):
             mode = self.projected(mode)

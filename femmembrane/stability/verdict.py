@@ -107,11 +107,13 @@ def axisymmetric_verdict(
 def verdict_from(found: SmallestEigenvalue, among: str, control: str | None, n: int, shape: Shape) -> Verdict:
     """The verdict that a smallest eigenvalue means for a class of perturbations, named in words."""
     stable = None if abs(found.value) <= found.error else found.value > 0
-    reason = {
-        True: f"stable: energy rises under all {among} (smallest eigenvalue {found.value:.6g})",
-        False: f"unstable: energy falls in {found.negative} direction(s) among {among} (smallest eigenvalue {found.value:.6g})",
-        None: f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}",
-    }[stable]
+    value = f"(smallest eigenvalue {found.value:.6g})"
+    if stable is None:
+        reason = f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}"
+    elif stable:
+        reason = f"stable: energy rises under all {among} {value}"
+    else:
+        reason = f"unstable: energy falls in {found.negative} direction(s) among {among} {value}"
     return Verdict(stable, found.value, found.error, control, n, found.negative, reason, found.mode, shape)
 
 

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from ..accuracy.adapt import spread
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..potential import Array, Potential, potential_of
-from ..results.records import Branch, Equilibrium, Jump, SpecialPoint
+from ..results.checkpoint import same_scene
+from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 from ..scene import Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
@@ -25,8 +26,8 @@ from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness
 from ..threads import one_thread
 from .meshing import on_chosen_mesh
-from .recording import OnStep, record, resume
-from .trace import trace
+from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
+from .trace import resume_trace, trace
 
 _SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
 _CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl, "height": CenterHeightControl}
@@ -137,20 +138,49 @@ def equilibrium(
 
 
 @one_thread
-def run(scene: Scene, on_step: OnStep | None = None) -> Branch:
+def run(
+    scene: Scene, on_step: OnStep | None = None, *, on_checkpoint: OnCheckpoint | None = None, unfinished: Branch | None = None
+) -> Branch:
     """Do what the scene's [run] says; never raises for a solve that fails: the branch carries its status and message.
+
+    Parameters
+    ----------
+    scene : Scene
+    on_step : callable, optional
+        Called with (index, total, equilibrium) after each equilibrium.
+    on_checkpoint : callable, optional
+        Called after each equilibrium with the branch so far, which may be saved.
+    unfinished : Branch, optional
+        The last branch that ``on_checkpoint`` was called with, when a run of this scene was interrupted: it is finished, and the result is
+        that of an uninterrupted run to the last bit.
 
     Raises
     ------
     InputError
-        When the scene has no [run].
+        When the scene has no [run], or ``unfinished`` belongs to another scene.
     """
     if scene.run is None:
         raise InputError("run", None, 'a [run] table is required, for instance control = "volume", start = 0.5, stop = 75.0, steps = 60')
     asked = scene.run
+    if unfinished is not None:
+        scene = same_scene(scene, unfinished, "unfinished")
     if asked.control == "arc-length":
-        return trace(scene, start=cast(float, asked.start), until=asked.until, max_steps=asked.max_steps, throw=False, on_step=on_step)
-    return _follow(scene, asked.control, asked.loads(), None, asked.solver, False, on_step, asked.at_limit)
+        observers: dict[str, Any] = {"on_step": on_step, "on_checkpoint": on_checkpoint}
+        if unfinished is not None:
+            return resume_trace(scene, unfinished, until=asked.until, max_steps=asked.max_steps, **observers)
+        return trace(scene, start=cast(float, asked.start), until=asked.until, max_steps=asked.max_steps, throw=False, **observers)
+    return _follow(
+        scene,
+        asked.control,
+        asked.loads(),
+        None,
+        asked.solver,
+        False,
+        on_step,
+        asked.at_limit,
+        on_checkpoint=on_checkpoint,
+        kept=unfinished,
+    )
 
 
 def _loads(key: str, values: ArrayLike) -> Array:
@@ -172,6 +202,9 @@ def _follow(
     throw: bool,
     on_step: OnStep | None,
     at_limit: str = "stop",
+    *,
+    on_checkpoint: OnCheckpoint | None = None,
+    kept: Branch | None = None,
 ) -> Branch:
     if solver not in _SOLVERS:
         raise unknown_name("solver", solver, _SOLVERS)
@@ -192,8 +225,12 @@ def _follow(
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
     status, message = Status.CONVERGED, ""
+    used = solver if control in _MINIMISED else "newton"
     walk = _Walk(potential, control, _SOLVERS[solver], start)
-    for index, load in enumerate(loads):
+    if kept is not None:
+        found, jumps, timings = list(kept), list(kept.jumps), {**timings, **kept.timings}
+        walk.go_on(kept, loads)
+    for index, load in enumerate(loads[len(found) :], len(found)):
         clock = time.perf_counter()
         try:
             state, limit = walk.to(float(load), at_limit == "jump")
@@ -213,7 +250,11 @@ def _follow(
         if new.status is Status.SLACK and index + 1 < len(loads):
             status, message = Status.SLACK, f"{control} {loads[index + 1]:.9g} was not reached: {slackness(potential, state)}"
             break
-    branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps))
+        if on_checkpoint is not None:
+            memory = remembered(walk.path, potential.space.n_free)
+            so_far = Branch(scene, tuple(found), Status.INTERRUPTED, "interrupted", dict(timings), memory=memory, jumps=tuple(jumps))
+            on_checkpoint(replace(so_far, solver=used))
+    branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps), solver=used)
     if throw and message:
         raise SolveError(f"{message}; {status.advice}", status=status, result=branch)
     return branch
@@ -259,6 +300,13 @@ class _Walk:
             if self.corrector is minimize_and_verify and not is_minimum(potential, self.control_at(self.load), self.state.evaluation):
                 message = f"the start (V = {start.volume:.6g}, P = {start.pressure:.6g}) is no minimum under {control} control"
                 raise SolveError(message, status=Status.NOT_A_MINIMUM)
+
+    def go_on(self, kept: Branch, loads: Array) -> None:
+        """Stand where a run through these loads was interrupted."""
+        memory = kept.memory
+        if type(memory) is not PathMemory or not 0 < len(kept) <= len(loads):
+            raise InputError("unfinished", kept, "a branch that on_checkpoint was called with is allowed")
+        self.state, self.path, self.load = restore(self.potential, kept[-1]), path_of(memory), float(loads[len(kept) - 1])
 
     def to(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """The state at a load, and where the branch turned back if it had to be left for it."""

@@ -5,18 +5,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
-from ..results.records import Equilibrium
+from ..results.records import Branch, Equilibrium, PathMemory
 from ..scene import Scene
 from ..solve.controls import Gas, PressureControl, VolumeControl
-from ..solve.newton import correct
-from ..solve.state import State
+from ..solve.newton import RESIDUAL, correct, relative_residual
+from ..solve.state import Path, State
 from ..solve.wellposed import ill_posed
 from ..stability.judge import judge
 from ..stability.verdict import Verdict
 
 OnStep = Callable[[int, int, Equilibrium], None]
+#: called after each step with the branch so far, from which the run can be resumed
+OnCheckpoint = Callable[[Branch], None]
 
 
 def resume(potential: Potential, start: Equilibrium) -> State:
@@ -31,6 +35,35 @@ def resume(potential: Potential, start: Equilibrium) -> State:
     if result.status is not Status.CONVERGED:
         raise SolveError("the start is no equilibrium of this scene", status=result.status)
     return State.of(result)
+
+
+def restore(potential: Potential, kept: Equilibrium) -> State:
+    """The solver's state of an equilibrium of this very scene, to the last bit: it is looked at, not solved again.
+
+    Raises
+    ------
+    InputError
+        When it is no equilibrium of the scene.
+    """
+    if kept.state.shape != (potential.space.n_free,):
+        raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
+    evaluation = potential.evaluate(kept.state, kept.pressure)
+    force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
+    residual = relative_residual(potential, force, evaluation, kept.pressure)
+    if not residual <= max(RESIDUAL, 10 * kept.residual):
+        raise InputError("start", kept, f"an equilibrium of this scene is allowed; forces are out of balance by {residual:.1e}")
+    return State(kept.state, kept.pressure, evaluation, kept.iterations, 0.0, residual, 0.0)
+
+
+def remembered(path: Path, unknowns: int) -> PathMemory:
+    """A copy of a path, for the record."""
+    shape = (len(path.sigma), unknowns + 1)
+    return PathMemory(tuple(path.sigma), np.array(path.point).reshape(shape), np.array(path.slope).reshape(shape))
+
+
+def path_of(memory: PathMemory) -> Path:
+    """The path that was remembered."""
+    return Path(list(memory.sigma), list(memory.points), list(memory.slopes))
 
 
 def record(

@@ -21,7 +21,7 @@ from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
-from .recording import OnStep, record, resume
+from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
 
 #: distance to a source at which the membrane counts as touching it
 CONTACT = 1e-3
@@ -40,6 +40,7 @@ def trace(
     ill_posed: str = "stop",
     throw: bool = False,
     on_step: OnStep | None = None,
+    on_checkpoint: OnCheckpoint | None = None,
 ) -> Branch:
     """Follow a branch by arc length, stable or not, through limit points and folds.
 
@@ -67,6 +68,8 @@ def trace(
         reason in its status and message.
     on_step : callable, optional
         Called with (index, total, equilibrium) after each step.
+    on_checkpoint : callable, optional
+        Called after each step with the branch so far, which may be saved and later given as ``start``.
 
     Returns
     -------
@@ -82,11 +85,28 @@ def trace(
     scene, start, timings = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
     tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)
     tracing.timings |= timings
-    status, message = tracing.follow(targets, ill_posed)
+    status, message = tracing.follow(targets, ill_posed, on_checkpoint)
     branch = tracing.branch(status, message)
     if throw and message and (until is not None or status is not Status.STEP_LIMIT):
         raise SolveError(message, status=status, result=branch)
     return branch
+
+
+@one_thread
+def resume_trace(
+    scene: Scene,
+    kept: Branch,
+    *,
+    until: Mapping[str, float] | None,
+    max_steps: int,
+    on_step: OnStep | None,
+    on_checkpoint: OnCheckpoint | None,
+) -> Branch:
+    """Finish the trace of this scene that was interrupted: the branch, status and message of one that was not."""
+    tracing = _begin(scene, kept, 1, None, True, on_step, max_steps, "stop")
+    tracing.made = tracing.regular - 1
+    tracing.timings |= kept.timings
+    return tracing.branch(*tracing.follow(_targets(until), "stop", on_checkpoint))
 
 
 def _on_mesh(
@@ -234,26 +254,26 @@ class _Tracing:
         cls, scene: Scene, potential: Potential, start: Branch, tracer: Tracer, on_step: OnStep | None, max_steps: int
     ) -> _Tracing:
         memory = start.memory
-        if memory is None:
+        if not isinstance(memory, TraceMemory):
             raise InputError(
                 "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
             )
-        for sigma, z, slope in zip(memory.sigma, memory.points, memory.slopes, strict=True):
-            tracer.path.append(sigma, z[:-1], float(z[-1]), slope[:-1], float(slope[-1]))
-        tracer.step = memory.step
-        state = resume(potential, start[memory.regular - 1])
+        tracer.path, tracer.step = path_of(memory), memory.step
+        state = restore(potential, start[memory.regular - 1])
         point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1][:-1], float(memory.slopes[-1][-1]))
         # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
         found = [eq.in_scene(scene) for eq in start[: memory.regular]]
         special = None
         if start.special_points is not None:
             special = [replace(p, equilibrium=p.equilibrium.in_scene(scene)) for p in start.special_points]
-        return cls(scene, potential, point, tracer, found, special, on_step, max_steps, memory.regular)
+        unexplained = list(memory.unexplained)
+        return cls(scene, potential, point, tracer, found, special, on_step, max_steps, memory.regular, unexplained=unexplained)
 
-    def follow(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str]:
+    def follow(self, targets: Mapping[str, float], ill_posed: str, on_checkpoint: OnCheckpoint | None = None) -> tuple[Status, str]:
         """Step until a target is met or the branch ends; the status, and a message unless a target was met."""
         while (end := self.advance(targets, ill_posed)) is None:
-            pass
+            if on_checkpoint is not None:
+                on_checkpoint(self.branch(Status.INTERRUPTED, "interrupted"))
         return end
 
     def advance(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str] | None:
@@ -354,7 +374,7 @@ class _Tracing:
         return error.status, str(error)
 
     def branch(self, status: Status, message: str) -> Branch:
-        path = self.tracer.path
-        memory = TraceMemory(tuple(path.sigma), np.array(path.point), np.array(path.slope), self.tracer.step, self.regular)
+        path = remembered(self.tracer.path, self.potential.space.n_free)
+        memory = TraceMemory(path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained))
         special = None if self.special is None else tuple(self.special)
-        return Branch(self.scene, tuple(self.found), status, message, self.timings, special, memory)
+        return Branch(self.scene, tuple(self.found), status, message, dict(self.timings), special, memory, solver="newton")

@@ -10,25 +10,19 @@ with (rho, eta) the equilibrium, (u, c, w) the mode and A the amplitude. An unst
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..results.store import replace_file
 from ..stability.verdict import Verdict
-from .vtk import (
-    SECTORS,
-    Array,
-    Revolution,
-    _aim,
-    _drawn_circles,
-    _extent,
-    smooth_profile,
-    write_collection,
-)
+from .picture import aim, circles, new_plotter, polydata
+from .stage import Box
+from .vtk import SECTORS, Array, Revolution, smooth_profile, write_collection
 
 if TYPE_CHECKING:
     import pyvista
@@ -44,6 +38,8 @@ _PER_WAVE = 12
 _TO_THE_RIGHT, _UPWARD = np.array([1.0, 0.3, 0.0]) / np.hypot(1.0, 0.3), np.array([0.0, 0.0, 1.0])
 #: colour of the equilibrium's lines
 _REST = "#4a8f4a"
+_MAP = "coolwarm"
+_MATT: dict[str, Any] = {"smooth_shading": True, "ambient": 0.4, "diffuse": 0.6}
 
 
 def write_mode_vtk(
@@ -79,7 +75,7 @@ def write_mode_vtk(
     """
     if isinstance(frames, bool) or not isinstance(frames, (int, np.integer)) or frames < 2:
         raise InputError("frames", frames, "a whole number >= 2 is allowed")
-    surface = _ModeSurface(equilibrium, mode, amplitude)
+    surface = ModeSurface(equilibrium, mode, amplitude)
     return write_collection(path, frames, lambda frame, file: _write_frame(surface, float(np.cos(2 * np.pi * frame / frames)), file))
 
 
@@ -113,19 +109,13 @@ def render_mode(
     InputError
         For an amplitude that is no number, a verdict that has no mode, a mode of another mesh, or a file that cannot be written.
     """
-    import pyvista
-
-    surface = _ModeSurface(equilibrium, mode, amplitude, sectors=4 * SECTORS)
-    with replace_file(path) as temporary, pyvista.vtk_verbosity("off"):  # VTK reports a missing display before it does without
-        plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
-        try:
-            _draw(plotter, surface, size[1] / 700)
-            plotter.screenshot(str(temporary))
-        finally:
-            plotter.close()
+    surface = ModeSurface(equilibrium, mode, amplitude, sectors=4 * SECTORS)
+    with replace_file(path) as temporary, new_plotter(size) as plotter:
+        _draw(plotter, surface)
+        plotter.screenshot(str(temporary))
 
 
-class _ModeSurface:
+class ModeSurface:
     """Points of the equilibrium and their displacements at full amplitude."""
 
     def __init__(self, equilibrium: Equilibrium, mode: Vibration | Verdict, amplitude: float | None, sectors: int = SECTORS) -> None:
@@ -133,7 +123,7 @@ class _ModeSurface:
         self.n, self.caption = mode.azimuthal, _caption(mode)
         profile = smooth_profile(equilibrium)
         self.rho, self.eta = profile["rho"], profile["eta"]
-        self.extent = _extent(profile)
+        self.extent = Box.of([profile]).size
         self.revolution = Revolution.of(profile["r"], sectors=max(sectors, _PER_WAVE * self.n))
         self.rest = self.revolution.vectors(self.rho, self.eta)
         unit = _displacements(self.revolution, shape, self.n)
@@ -142,6 +132,11 @@ class _ModeSurface:
         elif not np.isfinite(amplitude):
             raise InputError("amplitude", amplitude, "a finite number is allowed")
         self.displacement = amplitude * unit
+
+    @cached_property
+    def normal(self) -> Array:
+        """Displacement along the normal of the equilibrium over the largest displacement, shape (n_points,)."""
+        return _along_the_normal(self)
 
 
 def _caption(mode: Vibration | Verdict) -> str:
@@ -171,7 +166,7 @@ def _displacements(revolution: Revolution, shape: Mapping[str, Array], n: int) -
     return np.stack([u * x - c * y, u * y + c * x, w], axis=1)
 
 
-def _write_frame(surface: _ModeSurface, phase: float, file: Path) -> None:
+def _write_frame(surface: ModeSurface, phase: float, file: Path) -> None:
     import meshio
 
     revolution = surface.revolution
@@ -182,65 +177,80 @@ def _write_frame(surface: _ModeSurface, phase: float, file: Path) -> None:
         mesh.write(temporary, file_format="vtu")
 
 
-def _polydata(revolution: Revolution, points: Array) -> pyvista.PolyData:
+def _draw(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
+    """On the left the equilibrium, on the right the membrane at full amplitude."""
+    beside = surface.rest - 1.15 * surface.extent * _TO_THE_RIGHT
+    plotter.add_mesh(polydata(surface.revolution, beside), color="#d9e6d6", **_MATT)
+    _draw_lines(plotter, surface, beside, _REST)
+    draw_moved(plotter, surface, 1.0)
+    _draw_key(plotter, surface, position_x=0.57)
+    low = surface.rest - 0.3 * surface.extent * _UPWARD
+    aim(plotter, np.concatenate([beside, surface.rest, surface.rest + surface.displacement, low]), bar=0.0, margin=0.04)
+
+
+def set_up_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
+    """What does not move: the key, and a camera that sees the whole motion."""
+    _draw_key(plotter, surface, position_x=0.58)
+    low = surface.rest - 0.3 * surface.extent * _UPWARD
+    moved = [surface.rest + sign * surface.displacement for sign in (1, -1)]
+    aim(plotter, np.concatenate([*moved, low]), bar=0.0, margin=0.06)
+
+
+def draw_moved(plotter: pyvista.Plotter, surface: ModeSurface, part: float) -> None:
+    """The membrane at a part, -1 to 1, of the amplitude beside the circles of the equilibrium, in place of the one drawn before."""
+    moved = surface.rest + part * surface.displacement
+    coloured = polydata(surface.revolution, moved)
+    coloured.point_data["normal"] = part * surface.normal
+    look = {"clim": (-1, 1), "cmap": _MAP, "show_scalar_bar": False, "name": "moved", "reset_camera": False, "render": False, **_MATT}
+    plotter.add_mesh(coloured, scalars="normal", **look)
+    _draw_lines(plotter, surface, moved, "black", meridians=True, name="lines")
+    _draw_lines(plotter, surface, surface.rest, _REST, name="rest")
+
+
+def _draw_key(plotter: pyvista.Plotter, surface: ModeSurface, position_x: float) -> None:
     import pyvista
 
-    faces = [np.insert(cells, 0, cells.shape[1], axis=1).ravel() for cells in (revolution.triangles, revolution.quads)]
-    return pyvista.PolyData(points, faces=np.concatenate(faces))
-
-
-def _draw(plotter: pyvista.Plotter, surface: _ModeSurface, scale: float) -> None:
-    """On the left the equilibrium, on the right the membrane at full amplitude."""
-    plotter.set_background("white")
-    plotter.enable_anti_aliasing("ssaa")
-    matt = {"smooth_shading": True, "ambient": 0.4, "diffuse": 0.6}
-    beside = surface.rest - 1.15 * surface.extent * _TO_THE_RIGHT
-    moved = surface.rest + surface.displacement
-    plotter.add_mesh(_polydata(surface.revolution, beside), color="#d9e6d6", **matt)
-    _draw_lines(plotter, surface, beside, _REST)
-    coloured = _polydata(surface.revolution, moved)
-    coloured.point_data["normal"] = _along_the_normal(surface)
-    shown = plotter.add_mesh(coloured, scalars="normal", clim=(-1, 1), cmap="coolwarm", show_scalar_bar=False, **matt)
-    _draw_lines(plotter, surface, moved, "black", meridians=True)
-    _draw_lines(plotter, surface, surface.rest, _REST)
-    text, black = round(18 * scale), "black"
+    width, height = plotter.window_size
+    scale = min(height / 700, width / 900)
+    mapper = pyvista.DataSetMapper()
+    mapper.lookup_table = pyvista.LookupTable(_MAP, scalar_range=(-1, 1))
+    mapper.scalar_range = (-1, 1)
     plotter.add_scalar_bar(
-        "displacement along the normal, over the largest one\n",
-        mapper=shown.mapper,
-        color=black,
-        title_font_size=text,
-        label_font_size=text,
+        "displacement along the normal\nover the largest one\n",
+        mapper=mapper,
+        color="black",
+        title_font_size=round(18 * scale),
+        label_font_size=round(18 * scale),
         n_labels=5,
         fmt="%.1f",
         width=0.36,
-        height=0.12,
-        position_x=0.57,
+        height=0.14,
+        position_x=position_x,
         position_y=0.02,
+        render=False,
     )
-    plotter.add_text(
-        surface.caption, position=(0.03 * plotter.window_size[0], 0.03 * plotter.window_size[1]), font_size=11 * scale, color=black
-    )
-    low = surface.rest - 0.25 * surface.extent * _UPWARD
-    _aim(plotter, np.concatenate([beside, surface.rest, moved, low]), bar=0.0, margin=0.04)
+    plotter.add_text(surface.caption, position=(0.03 * width, 0.03 * height), font_size=11 * scale, color="black", render=False)
 
 
-def _along_the_normal(surface: _ModeSurface) -> Array:
-    rest = _polydata(surface.revolution, surface.rest)
+def _along_the_normal(surface: ModeSurface) -> Array:
+    """Displacement along the normal of the equilibrium over the largest displacement."""
+    rest = polydata(surface.revolution, surface.rest)
     normals = rest.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False)
     largest = np.linalg.norm(surface.displacement, axis=1).max()
     return (surface.displacement * normals.point_data["Normals"]).sum(axis=1) / (largest or 1.0)
 
 
-def _draw_lines(plotter: pyvista.Plotter, surface: _ModeSurface, points: Array, color: str, meridians: bool = False) -> None:
+def _draw_lines(
+    plotter: pyvista.Plotter, surface: ModeSurface, points: Array, color: str, meridians: bool = False, name: str | None = None
+) -> None:
     """A few circles of a surface, and meridians every 30 degrees."""
     import pyvista
 
     node = surface.revolution.node
-    lines = [(points[node == circle], True) for circle, _ in _drawn_circles(surface.rho, surface.eta)]
+    lines = [(points[node == circle], True) for circle, _ in circles(surface.rho, surface.eta, ())]
     if meridians:
         turn = np.round(np.arctan2(surface.revolution.sine, surface.revolution.cosine) / (np.pi / 6), 6) % 12
         axis = points[:1] if np.count_nonzero(node == 0) == 1 else points[:0]
         lines += [(np.concatenate([axis, points[(turn == k) & (node > 0)]]), False) for k in range(12)]
-    for line, closed in lines:
-        tube = pyvista.lines_from_points(line, close=closed).tube(radius=0.0016 * surface.extent)
-        plotter.add_mesh(tube, color=color, ambient=1.0, diffuse=0.0)
+    tubes = [pyvista.lines_from_points(line, close=closed).tube(radius=0.0016 * surface.extent, n_sides=8) for line, closed in lines]
+    plotter.add_mesh(pyvista.merge(tubes), color=color, ambient=1.0, diffuse=0.0, name=name, reset_camera=False, render=False)

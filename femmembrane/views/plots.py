@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
 from ..results.store import replace_file
+from .stage import Box, clamped_ends, surroundings
 from .vtk import smooth_profile
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, draw_meridian_zones, fill_zones, new_label, shown_kinds, zone_label, zone_order
 
@@ -157,6 +158,13 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
     """
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.2), title=branch.scene.title)
+    handles = draw_zones(axes, branch)
+    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
+    return save_figure(figure, path)
+
+
+def draw_zones(axes: Axes, branch: Branch) -> list[Any]:
+    """The zones of a branch on labelled axes, as in :func:`plot_zones`; handles for a legend."""
     volume = np.array([equilibrium.volume for equilibrium in branch])
     steps = np.diff(volume)
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
@@ -164,8 +172,7 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
     axes.set_xlabel(VOLUME_LABEL if monotone else "step")
     axes.set_ylabel("reference radius r/R₀")
     axes.margins(0)
-    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
-    return save_figure(figure, path)
+    return list(handles)
 
 
 # --- frames
@@ -470,31 +477,31 @@ def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style, *, zones: b
 
 
 def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium]) -> None:
-    """What drawn meridians stand in: labelled axes of equal scale, the clamped rim, and the magnetic sources of their scene."""
+    """What drawn meridians stand in: labelled axes of equal scale, the clamped ends, and the magnetic sources of their scene."""
     axes.set_xlabel(RADIUS_LABEL)
     axes.set_ylabel("height η/R₀")
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(nbins=6)
-    axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
-    axes.plot([-1, 1], [0, 0], "s", color="black", markersize=5, zorder=5)
+    for _, rho, eta in clamped_ends(shown[0]):
+        axes.axhline(eta, color="0.8", linewidth=0.8, zorder=0)
+        axes.plot([-rho, rho], [eta, eta], "s", color="black", markersize=5, zorder=5)
     _draw_sources(axes, shown)
 
 
 def _draw_sources(axes: Axes, shown: Sequence[Equilibrium]) -> None:
-    """Sources on the axis as arrows along their moments; one further away than the picture is wide is named, not drawn."""
-    eta = np.concatenate([e.profile()["eta"] for e in shown])
-    rho = max(float(np.max(e.profile()["rho"])) for e in shown)
-    extent = max(float(np.ptp(eta)), 2 * rho)
-    for source in shown[0].scene.sources:
-        height = getattr(source, "height", None)
-        if height is None:
-            continue
-        name, up = type(source).__name__.lower(), getattr(source, "orientation", 1)
-        if min(abs(height - eta.min()), abs(height - eta.max())) > 1.5 * extent:
-            axes.plot([], [], " ", label=f"({name} at height {height:g})")
-            continue
-        tail, tip = height - 0.08 * up * extent, height + 0.08 * up * extent
-        arrow = {"arrowstyle": "-|>", "color": _RED, "linewidth": 2.0, "mutation_scale": 14}
-        axes.annotate("", xy=(0, tip), xytext=(0, tail), arrowprops=arrow)
-        axes.plot([0], [height], "o", color=_RED, markersize=6, label=f"{name} at height {height:g}")
-        axes.update_datalim([(0, tail), (0, tip)])
+    """Bodies of sources, with an arrow along the moment; one that is not drawn is named."""
+    box = Box.of([e.profile() for e in shown])
+    around = surroundings(shown[0].scene, box)
+    for body in around.near:
+        rho, z = np.array(body.points).T
+        middle = float(z.mean())
+        if body.moment:
+            tail, tip = (middle + sign * 0.11 * body.moment * box.size for sign in (-1, 1))
+            arrow = {"arrowstyle": "-|>", "color": _RED, "linewidth": 2.0, "mutation_scale": 14}
+            axes.annotate("", xy=(0, tip), xytext=(0, tail), arrowprops=arrow)
+            axes.update_datalim([(0, tail), (0, tip)])
+        look: dict[str, Any] = {"color": _RED, "linewidth": 2.5, **({"marker": "o", "markersize": 6} if rho.size == 1 else {})}
+        for side in (1, -1) if rho.any() else (1,):
+            axes.plot(side * rho, z, label=body.label if side > 0 else None, **look)
+    for name in around.absent:
+        axes.plot([], [], " ", label=f"({name})")

@@ -1,4 +1,4 @@
-"""The deformed membrane as a surface of revolution: VTU files for ParaView, and rendered pictures.
+"""The deformed membrane as a surface of revolution, and as VTU files for ParaView.
 
 A meridian of n nodes is turned about the axis in equal sectors. Points are numbered ring by ring, a node on the axis being one point::
 
@@ -16,19 +16,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..results.store import MEANING, replace_file
+from ..results.store import replace_file
 
 if TYPE_CHECKING:
-    import pyvista
-
-    from ..results.records import Branch, Equilibrium
+    from ..results.records import Equilibrium
 
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
@@ -47,8 +45,6 @@ FIELDS = (
     "total_stress_2_pa",
 )
 SECTORS = 48
-#: a source further from the membrane than this many times its size would leave the membrane a speck in the picture
-_FAR = 1.5
 
 
 @dataclass(frozen=True)
@@ -101,7 +97,7 @@ class Revolution:
         return values[self.node]
 
 
-def write_vtk(branch: Branch, path: str | PathLike[str]) -> list[Path]:
+def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[Path]:
     """Write one VTU file an equilibrium and the PVD file that strings them together for ParaView.
 
     The VTU files go to a folder beside ``path``, named like it. Time is the step number; volume and pressure are cell data. When the
@@ -118,7 +114,7 @@ def write_vtk(branch: Branch, path: str | PathLike[str]) -> list[Path]:
     InputError
         When the name does not end in ``.pvd`` or the folder cannot be written to.
     """
-    return write_collection(path, len(branch), lambda step, file: _write_surface(branch[step], smooth_profile(branch[step]), file))
+    return write_collection(path, len(branch), lambda step, file: write_surface(branch[step], smooth_profile(branch[step]), file))
 
 
 def write_collection(path: str | PathLike[str], count: int, write_one: Callable[[int, Path], None]) -> list[Path]:
@@ -168,73 +164,32 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
     return profile
 
 
-def render(
-    shown: Branch | Equilibrium, path: str | PathLike[str], *, quantity: str = "stretch_2", size: tuple[int, int] = (1200, 900)
-) -> None:
-    """Draw an equilibrium (of a branch: the last one) as a coloured surface, without a display.
-
-    Parameters
-    ----------
-    shown : Branch or Equilibrium
-    path : path
-        PNG file to write.
-    quantity : str
-        What the colour shows: one of :data:`FIELDS` (those in Pa only when the scene has scales).
-    size : tuple of int
-        Width and height of the picture in pixels.
-
-    Raises
-    ------
-    InputError
-        For an empty branch, an unknown quantity, or a file that cannot be written.
-    """
-    import pyvista
-
-    equilibrium = _one(shown)
-    profile = smooth_profile(equilibrium, points=101)
-    if quantity not in FIELDS or quantity not in profile:
-        raise InputError("quantity", quantity, "known: " + ", ".join(f for f in FIELDS if f in profile))
-    with replace_file(path) as temporary, pyvista.vtk_verbosity("off"):  # VTK reports a missing display before it does without
-        plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
-        try:
-            plotter.set_background("white")
-            plotter.enable_anti_aliasing("ssaa")
-            drawn = _draw_membrane(plotter, profile, quantity, size[1] / 900)
-            drawn += _draw_sources(plotter, equilibrium, profile, size[1] / 900)
-            _aim(plotter, np.concatenate(drawn))
-            plotter.screenshot(str(temporary))
-        finally:
-            plotter.close()
-
-
-def _one(shown: Branch | Equilibrium) -> Equilibrium:
-    if not isinstance(shown, Sequence):
-        return shown
-    if not len(shown):
-        raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
-    return shown[-1]
-
-
-def _write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
+def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
+    """Write the surface of one equilibrium as a VTU file."""
     import meshio
 
     revolution = Revolution.of(profile["r"])
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
-    rho, eta = profile["rho"], profile["eta"]
-    R, Z = equilibrium.scene.mesh.position(equilibrium.potential.space.node_parameters())
-    point_data = {"displacement": revolution.vectors(rho - R, eta - Z)}
-    point_data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
-    if equilibrium.scene.analysis.wrinkling:
-        point_data["zone"] = revolution.scalars(equilibrium.zones().numbers(equilibrium.potential.space.node_parameters()).astype(np.int32))
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     mesh = meshio.Mesh(
-        revolution.vectors(rho, eta),
+        revolution.vectors(profile["rho"], profile["eta"]),
         cells,
-        point_data=point_data,
+        point_data=surface_data(equilibrium, profile, revolution),
         cell_data={name: [np.full(len(c), load) for _, c in cells] for name, load in loads.items()},
     )
     with replace_file(file) as temporary:
         mesh.write(temporary, file_format="vtu")
+
+
+def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolution: Revolution) -> dict[str, NDArray[Any]]:
+    """What is known at the points of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
+    parameters = equilibrium.potential.space.node_parameters()
+    R, Z = equilibrium.scene.mesh.position(parameters)
+    data: dict[str, NDArray[Any]] = {"displacement": revolution.vectors(profile["rho"] - R, profile["eta"] - Z)}
+    data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
+    if equilibrium.scene.analysis.wrinkling:
+        data["zone"] = revolution.scalars(equilibrium.zones().numbers(parameters).astype(np.int32))
+    return data
 
 
 def _surface_file(path: Path, step: int) -> Path:
@@ -252,93 +207,3 @@ def _collection(path: Path, files: list[Path]) -> str:
     names = [quoteattr(file.relative_to(path.parent).as_posix()) for file in files]
     entries = "".join(f'    <DataSet timestep="{step}" part="0" file={name}/>\n' for step, name in enumerate(names))
     return f'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n{entries}  </Collection>\n</VTKFile>\n'
-
-
-def _draw_membrane(plotter: pyvista.Plotter, profile: Mapping[str, Array], quantity: str, scale: float) -> list[Array]:
-    """Draw the surface, its rim and a few parallels; the points that must be in the picture."""
-    import pyvista
-
-    revolution = Revolution.of(profile["r"], sectors=4 * SECTORS)
-    points = revolution.vectors(profile["rho"], profile["eta"])
-    faces = np.concatenate([np.insert(c, 0, c.shape[1], axis=1).ravel() for c in (revolution.triangles, revolution.quads)])
-    surface = pyvista.PolyData(points, faces=faces)
-    surface.point_data[quantity] = revolution.scalars(profile[quantity])
-    meaning, unit = MEANING[quantity]
-    bar = {
-        "title": (meaning if unit == "1" else f"{meaning} in {unit}").replace(" ", "\n") + "\n",
-        "vertical": True,
-        "n_labels": 5,
-        "fmt": "%.3g",
-        "color": "black",
-        "title_font_size": round(22 * scale),
-        "label_font_size": round(20 * scale),
-        "height": 0.55,
-        "width": 0.07,
-        "position_x": 0.85,
-        "position_y": 0.15,
-    }
-    # little shading, so that the colours stay those of the scale
-    look = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
-    plotter.add_mesh(surface, scalars=quantity, cmap="viridis", scalar_bar_args=bar, **look)
-    for node, radius in _drawn_circles(profile["rho"], profile["eta"]):
-        tube = pyvista.lines_from_points(points[revolution.node == node], close=True).tube(radius=radius * _extent(profile))
-        plotter.add_mesh(tube, color="black", ambient=1.0, diffuse=0.0)
-    return [points]
-
-
-def _drawn_circles(rho: Array, eta: Array, count: int = 6) -> list[tuple[int, float]]:
-    """Nodes whose circles are drawn, with their thickness: the rim, and a few at equal distances along the meridian to show the shape."""
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rho), np.diff(eta)))])
-    inner = np.searchsorted(length, length[-1] * np.arange(1, count) / count)
-    return [*((int(node), 0.0015) for node in np.unique(inner) if 0 < node < rho.size - 1), (rho.size - 1, 0.005)]
-
-
-def _extent(profile: Mapping[str, Array]) -> float:
-    """Size of the deformed membrane."""
-    return float(max(np.ptp(profile["eta"]), 2 * np.max(profile["rho"])))
-
-
-def _draw_sources(plotter: pyvista.Plotter, equilibrium: Equilibrium, profile: Mapping[str, Array], scale: float) -> list[Array]:
-    """A sphere with an arrow along the moment for each source that is near; a line of text for those that are far away."""
-    import pyvista
-
-    size, drawn, far = 0.1 * _extent(profile), [], []
-    for source in equilibrium.scene.sources:
-        height = getattr(source, "height", None)
-        if height is None:
-            continue
-        name = type(source).__name__.lower()
-        if np.min(np.abs(profile["eta"] - height)) > _FAR * _extent(profile):
-            far.append(f"{name} at height {height:g} not shown")
-            continue
-        up = float(getattr(source, "orientation", 1))
-        start = (0.0, 0.0, height - 1.2 * up * size)
-        arrow = pyvista.Arrow(start=start, direction=(0, 0, up), scale=2.4 * size, tip_length=0.3, tip_radius=0.12, shaft_radius=0.045)
-        sphere = pyvista.Sphere(radius=0.3 * size, center=(0, 0, height))
-        for part in (arrow, sphere):
-            plotter.add_mesh(part, color="#b03060", smooth_shading=True, ambient=0.3)
-            drawn.append(np.asarray(part.points))
-    if far:
-        corner = tuple(0.03 * length for length in plotter.window_size)
-        plotter.add_text("\n".join(far), position=corner, font_size=10 * scale, color="black")
-    return drawn
-
-
-def _aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18) -> None:
-    """Look from the front and a little from above, so that the points fill the picture beside the colour scale."""
-    toward = np.array([0.3, -1.0, 0.45])
-    toward /= np.linalg.norm(toward)
-    right = np.cross([0.0, 0.0, 1.0], toward)
-    right /= np.linalg.norm(right)
-    up = np.cross(toward, right)
-    x, y, depth = points @ right, points @ up, np.ptp(points @ toward) + 1.0
-    aspect = plotter.window_size[0] / plotter.window_size[1]
-    # height of the picture in units of the scene
-    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin)
-    centre = (x.min() + x.max()) / 2 * right + (y.min() + y.max()) / 2 * up + (points @ toward).mean() * toward
-    centre = centre + bar / 2 * aspect * height * right
-    plotter.enable_parallel_projection()
-    plotter.camera.focal_point, plotter.camera.up = tuple(centre), tuple(up)
-    plotter.camera.position = tuple(centre + 10 * depth * toward)
-    plotter.camera.parallel_scale = height / 2
-    plotter.renderer.ResetCameraClippingRange()

@@ -1,0 +1,66 @@
+from collections.abc import Sequence
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: names of the operations of a tape, by their code
+OPERATIONS: tuple[str, ...]
+
+@final
+class Factor:
+    def __new__(cls, band: Array, size: int, half_bandwidth: int) -> Factor: ...
+    def solve(self, x: Array) -> None: ...
+    def determinant_sign(self) -> int: ...
+
+@final
+class Border:
+    def solve(self, f: Array, g: float, x: Array) -> float: ...
+
+@final
+class Elements:
+    def __new__(
+        cls,
+        tape: tuple[Indices, Indices, Array, int, int, int, int, int],
+        data: Array,
+        gather: Indices,
+        table: Array,
+        field: Indices,
+        n_quadrature: int,
+        n_local: int,
+        half_bandwidth: int,
+    ) -> Elements: ...
+    def at_quadrature(self, x: Array, out: Array) -> None: ...
+    def evaluate(self, x: Array, parameters: Array, gradients: Array, densities: Array) -> tuple[float, float, float]: ...
+    def assemble(self, stiffness: Array, band: Array) -> None: ...
+    def correct(
+        self,
+        control: Sequence[object],
+        x: Array,
+        parameters: Array,
+        tolerance: float,
+        residual: float,
+        max_iterations: int,
+        gradients: Array,
+        densities: Array,
+    ) -> tuple[bool, float, float, float, float, int, float, float, float, Border | None]: ...
+
+def inertia(
+    band: Array, mass: Array | None, constraint: Array | None, size: int, half_bandwidth: int, compliance: float, shift: float
+) -> int: ...
+def inner(band: Array, size: int, half_bandwidth: int, x: Array, y: Array) -> float: ...
+def product(band: Array, size: int, half_bandwidth: int, x: Array, y: Array) -> None: ...
+def rayleigh(
+    band: Array,
+    mass: Array,
+    constraint: Array | None,
+    size: int,
+    half_bandwidth: int,
+    compliance: float,
+    mode: Array,
+    iterations: int,
+    gap: float,
+) -> tuple[float, float, int] | None: ...

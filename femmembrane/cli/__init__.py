@@ -1,0 +1,62 @@
+"""The command ``femmembrane``: a scene file in, a folder of results out.
+
+Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
+full disk), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
+In a pipe nothing is printed but errors, one line each on stderr. One module a command; whatever is slow to import is imported
+inside its functions, for ``--help`` should answer at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError
+
+from .. import __version__
+from ..errors import InputError
+from . import completion, convergence, cost, export, report, run, scenes, sweep, view
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail
+
+__all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
+
+app = App(
+    name="femmembrane",
+    help="Equilibria and stability of inflated magnetoelastic membranes.",
+    version=__version__,
+    help_format="plaintext",  # the import of a markdown parser is a quarter of the time to the first line
+    version_format="plaintext",
+    suppress_keyboard_interrupt=False,
+)
+
+for command in (
+    run.run,
+    sweep.sweep,
+    convergence.convergence,
+    cost.cost,
+    report.report,
+    view.view,
+    export.export,
+    scenes.scenes,
+    scenes.new,
+):
+    app.command(command)
+app.command(completion.install_completion, name="--install-completion")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The words after ``femmembrane``; those of the process by default.
+    """
+    try:
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
+    except (InputError, OSError) as error:
+        return fail(BAD_INPUT, str(error))
+    except KeyboardInterrupt:
+        return fail(INTERRUPTED, "interrupted; nothing was written")
+    return code or DONE

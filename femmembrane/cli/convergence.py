@@ -1,0 +1,66 @@
+"""``femmembrane convergence``: the last equilibrium of a scene file on many meshes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from ..errors import InputError, SolveError
+from .folders import prepare, read
+from .interrupts import Interrupts
+from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
+
+
+def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
+    """Solve the last equilibrium that a scene file asks for on many meshes, and write convergence.csv and convergence.png to a folder.
+
+    Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 4 results
+    could not be written, 130 interrupted.
+
+    Parameters
+    ----------
+    scene
+        Scene file (TOML).
+    out
+        Folder for the results, made when there is none.
+    degrees
+        Degrees of the elements, 1 to 8, separated by commas.
+    elements
+        Numbers of elements, increasing, separated by commas.
+    """
+    from ..scene import MAX_DEGREE
+
+    asked = read(scene)
+    meshes = {"degrees": _numbers("--degrees", degrees, MAX_DEGREE), "elements": _numbers("--elements", elements)}
+    prepare(out)
+    from ..results.lock import locked
+    from ..verbs.convergence import convergence_of_run
+
+    with locked(out), Interrupts() as interrupts:
+        try:
+            study = convergence_of_run(asked, **meshes)
+        except SolveError as error:
+            return fail(NOT_CONVERGED, explain(error.status, str(error)))
+        interrupts.check()
+        interrupts.hold = True
+        written = [out / "convergence.csv", out / "convergence.png"]
+        try:
+            study.write_csv(written[0])
+            study.plot(written[1])
+        except (InputError, OSError) as error:
+            return fail(NOT_WRITTEN, not_written(error, out))
+    if study.messages:
+        return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
+    if sys.stdout.isatty():
+        sys.stdout.write("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
+    return DONE
+
+
+def _numbers(option: str, text: str, most: int | None = None) -> tuple[int, ...]:
+    from ..verbs.arguments import check_increasing
+
+    try:
+        numbers = [int(word) for word in text.split(",")]
+    except ValueError:
+        raise InputError(option, text, "whole numbers separated by commas are allowed, such as 1,2,4") from None
+    return check_increasing(option, numbers, most)

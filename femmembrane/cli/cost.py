@@ -1,0 +1,49 @@
+"""``femmembrane cost``: error against time of the last equilibrium of a scene file."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from ..errors import InputError, SolveError
+from .folders import prepare, read
+from .interrupts import Interrupts
+from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
+
+
+def cost(scene: Path, /, *, out: Path, quick: bool = False) -> int:
+    """Measure error against time of the last equilibrium that a scene file asks for, by every method on every mesh.
+
+    Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 4 results could not be written, 130 interrupted;
+    with all but the first nothing is written.
+
+    Parameters
+    ----------
+    scene
+        Scene file (TOML).
+    out
+        Folder for the results, made when there is none.
+    quick
+        Few meshes, each measured once: seconds in place of minutes.
+    """
+    asked = read(scene)
+    prepare(out)
+    from ..results.lock import locked
+    from ..verbs.cost import QUICK, asked_load
+    from ..verbs.cost import cost as measure
+
+    with locked(out), Interrupts() as interrupts:
+        try:
+            study = measure(asked, **asked_load(asked) | (dict(QUICK) if quick else {}))
+        except SolveError as error:
+            return fail(NOT_CONVERGED, explain(error.status, str(error)))
+        interrupts.check()
+        interrupts.hold = True
+        try:
+            study.write_csv(out / "cost.csv")
+            study.plot(out / "cost.png")
+        except (InputError, OSError) as error:
+            return fail(NOT_WRITTEN, not_written(error, out))
+    if sys.stdout.isatty():
+        sys.stdout.write(f"{study}\n")
+    return DONE

@@ -1,0 +1,56 @@
+"""What a command reads and where it writes, checked before anything is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError, unknown_name
+from .scenes import bundled
+
+if TYPE_CHECKING:
+    from ..results.records import Branch
+    from ..scene import Scene
+
+
+def read(path: Path, needs_run: bool = True) -> Scene:
+    """The scene of a file, or one that comes with the package, by its name."""
+    from ..scene import Scene
+
+    if not path.suffix and not path.exists():
+        path = _bundled(str(path))
+    scene = Scene.from_toml(path)
+    if needs_run and scene.run is None:
+        raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
+    return scene
+
+
+def _bundled(name: str) -> Path:
+    known = bundled()
+    if name not in known:
+        error = unknown_name("scene", name, known)
+        raise InputError("scene", name, f"no such file, and no scene that comes along by this name: {error.allowed}")
+    return known[name]
+
+
+def prepare(out: Path) -> None:
+    """Make the folder and write to it once, before hours are spent on what could not be kept."""
+    import tempfile
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out) as probe:
+            probe.write(b"femmembrane")
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+        raise InputError("--out", str(out), f"cannot be written ({reason}); a folder, there already or to be made, is allowed") from None
+
+
+def finished(folder: Path) -> Branch:
+    """The branch that a run left in a folder, or that was saved to a file."""
+    from ..results.store import load
+
+    file = folder / "branch.nc" if folder.is_dir() else folder
+    if not file.is_file():
+        raise InputError("folder", str(folder), "the folder of a run (with its branch.nc) or a saved branch (.nc) is allowed")
+    return load(file)

@@ -1,0 +1,40 @@
+"""Ctrl-C during a computation and while its results are written."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+
+class Interrupts:
+    """Ctrl-C that is never lost, and spares the files.
+
+    Compiled solvers may swallow the exception that an interrupt raises, so it is also noted, and raised again at the next :meth:`check`.
+    While ``hold`` is set the first interrupt is noted only, so that a step or the results are finished; a second one gets through.
+    """
+
+    def __init__(self) -> None:
+        self.caught = False
+        self.hold = False
+        self._previous: Any = None
+
+    def __enter__(self) -> Self:
+        # elsewhere than in the main thread, or where the caller handles (or ignores) interrupts, they are not ours
+        if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            self._previous = signal.signal(signal.SIGINT, self._handle)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+
+    def check(self) -> None:
+        if self.caught:
+            raise KeyboardInterrupt
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        first, self.caught = not self.caught, True
+        if not (first and self.hold):
+            raise KeyboardInterrupt

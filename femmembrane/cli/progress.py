@@ -1,0 +1,70 @@
+"""The line on the terminal while equilibria are computed; none in a pipe."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Protocol, Self
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from ..results.records import Equilibrium
+    from ..scene import Scene
+
+
+class _Observer(Protocol):
+    def step(self, count: int, total: int, equilibrium: Equilibrium) -> None: ...
+
+
+class _Quiet:
+    def step(self, count: int, total: int, equilibrium: Equilibrium) -> None:
+        pass
+
+
+class _Bar:
+    """A line on the terminal: bar, step, load, pressure, verdicts, remaining time.
+
+    By arc length nobody knows how many steps there will be: in place of bar and remaining time stand how far the branch has come to where
+    it ends, and the time that has passed.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        words = TextColumn("{task.description}", markup=False)
+        known = scene.run is None or scene.run.until is None
+        columns = (BarColumn(bar_width=20), MofNCompleteColumn(), words, TimeRemainingColumn()) if known else (words, TimeElapsedColumn())
+        self._scene, self._known = scene, known
+        self._progress: Progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._task: TaskID = self._progress.add_task("", total=None)
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._progress.stop()
+
+    def step(self, count: int, total: int, equilibrium: Equilibrium) -> None:
+        line = _line(self._scene, equilibrium)
+        line = line if self._known else f"step {count}, {_way(self._scene, equilibrium)}  {line}"
+        self._progress.update(self._task, completed=count, total=total, description=line)
+
+
+def observer(scene: Scene) -> AbstractContextManager[_Observer]:
+    """Who watches a run: a line on a terminal, nobody in a pipe."""
+    return _Bar(scene) if sys.stderr.isatty() else nullcontext(_Quiet())
+
+
+def _way(scene: Scene, equilibrium: Equilibrium) -> str:
+    """How far an arc-length run has come."""
+    until = scene.run.until if scene.run is not None and scene.run.until else {}
+    return ", ".join(f"{name.replace('_', ' ')} {getattr(equilibrium, name):.4g} until {end:.4g}" for name, end in until.items())
+
+
+def _line(scene: Scene, equilibrium: Equilibrium) -> str:
+    verdicts = [f"{control}: {equilibrium.verdict(control).word}" for control in scene.analysis.stability]
+    verdicts += [f"n = {n}: {equilibrium.verdict(azimuthal=n).word}" for n in scene.analysis.azimuthal_modes]
+    return "  ".join([f"V = {equilibrium.volume:.4g}", f"P = {equilibrium.pressure:.4g}", *verdicts])

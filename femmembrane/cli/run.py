@@ -1,0 +1,153 @@
+"""``femmembrane run``: the equilibria of a scene file to a folder."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError, SolveError, Status
+from .folders import prepare, read
+from .interrupts import Interrupts
+from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written
+from .progress import observer
+from .report import write as write_report
+
+if TYPE_CHECKING:
+    from ..results.checkpoint import Checkpoints
+    from ..results.records import Branch, Equilibrium
+    from ..scene import Scene
+
+
+def run(scene: Path, /, *, out: Path, resume: bool = False, report: bool = False) -> int:
+    """Compute the equilibria that a scene file asks for and write them to a folder.
+
+    Now and then the branch so far is saved as checkpoint.nc: --resume goes on from there after an interrupt, a kill or a full disk. One run
+    at a time may write to a folder.
+
+    Exit codes: 0 done, 2 bad input or a folder in use, 3 not converged, 4 results could not be written, 130
+    interrupted; with 3 and 130 what was computed is written all the same, with 4 as much of it as there is room for.
+
+    Parameters
+    ----------
+    scene
+        Scene file (TOML).
+    out
+        Folder for the results, made when there is none; earlier results in it are replaced.
+    resume
+        Go on where a run of the same scene in this folder was interrupted; without one, start.
+    report
+        Write report.html as well, one page about the run.
+    """
+    asked = read(scene)
+    prepare(out)
+    from ..results.checkpoint import Checkpoints, same_scene, unfinished
+    from ..results.lock import locked
+    from ..results.output import clean
+
+    with locked(out), Interrupts() as interrupts:
+        clean(out)
+        kept = unfinished(out) if resume else None
+        if kept is not None:
+            same_scene(asked, kept, "--resume")
+        elif resume and (ended := _ended(asked, out)) is not None:
+            return ended
+        checkpoints = Checkpoints(out, kept)
+        interrupts.hold = True  # until the next equilibrium: raised inside a compiled solver it is swallowed, with a warning from there
+        branch, code, message = _compute(asked, interrupts, checkpoints)
+        if code == INTERRUPTED and not len(branch):  # whatever an earlier run left in the folder is worth more
+            raise KeyboardInterrupt
+        try:
+            if code == INTERRUPTED:
+                checkpoints.save()
+            written = _write(branch, out, scene)
+            if report:
+                written.append(write_report(out))
+        except (InputError, OSError) as error:
+            return fail(NOT_WRITTEN, _kept(error, checkpoints, out))
+        if code != INTERRUPTED:
+            checkpoints.remove()
+    if interrupts.caught:
+        code, message = INTERRUPTED, message if code == INTERRUPTED else "interrupted"
+    if code != DONE:
+        further = "; --resume goes on" if checkpoints.path.exists() else ""
+        return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
+    if sys.stdout.isatty():
+        sys.stdout.write(_summary(branch, written))
+    return DONE
+
+
+def _ended(scene: Scene, out: Path) -> int | None:
+    """The exit code of the run of this scene that has completed the folder, None if there is none and something is to be computed."""
+    from ..results.checkpoint import refuse_others
+    from ..results.output import read_record
+
+    facts = read_record(out)
+    if facts is None:
+        return None
+    refuse_others(scene, facts["scene"], "--resume")
+    if facts["status"] == Status.INTERRUPTED:
+        return None
+    message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
+    if facts["status"] == Status.CONVERGED:
+        return fail(DONE, message)
+    return fail(NOT_CONVERGED, f"{message}. {facts['message']}")
+
+
+def _compute(scene: Scene, interrupts: Interrupts, checkpoints: Checkpoints) -> tuple[Branch, int, str]:
+    """The branch as far as it could be followed, the exit code, and what happened if it is not 0."""
+    from ..verbs import run as run_scene
+
+    kept = checkpoints.latest
+    found: list[Equilibrium] = [] if kept is None else list(kept)
+    with observer(scene) as progress:
+
+        def on_step(index: int, total: int, equilibrium: Equilibrium) -> None:
+            interrupts.check()  # what a solver found after it swallowed an interrupt is not what it would have found
+            found.append(equilibrium)
+            progress.step(len(found), total, equilibrium)
+
+        try:
+            branch = run_scene(scene, on_step=on_step, on_checkpoint=checkpoints, unfinished=kept)
+            interrupts.check()
+        except (KeyboardInterrupt, SolveError) as error:
+            if interrupts.caught or not isinstance(error, SolveError):
+                return partial_branch(scene, found, Status.INTERRUPTED, "interrupted"), INTERRUPTED, "interrupted"
+            return partial_branch(scene, found, error.status, str(error)), NOT_CONVERGED, explain(error.status, str(error))
+    if branch.status == Status.CONVERGED:
+        return branch, DONE, ""
+    return branch, NOT_CONVERGED, explain(branch.status, branch.message)
+
+
+def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Status, message: str) -> Branch:
+    """The branch of what was found before the computation ended early; special points are not searched for."""
+    from ..results.records import Branch
+
+    used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
+    asked = used.run
+    solver = asked.solver if asked is not None and asked.control in ("volume", "pressure") else "newton"
+    return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver)
+
+
+def _write(branch: Branch, out: Path, scene: Path) -> list[Path]:
+    import shlex
+
+    from ..results.output import write_run
+
+    return write_run(branch, out, command=shlex.join(["femmembrane", "run", str(scene), "--out", str(out)]))
+
+
+def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:
+    """What is lost and what is not; the branch is saved for --resume, if a file of that size can be written now."""
+    with suppress(InputError, OSError):
+        checkpoints.save()
+    saved = checkpoints.path.exists()
+    advice = f"the computation is kept in {checkpoints.path.name}: make room, and --resume writes the rest" if saved else "make room"
+    return f"{not_written(error, out)}; {advice}"
+
+
+def _summary(branch: Branch, written: Sequence[Path]) -> str:
+    lines = [f"{count(len(branch))}, written:", *(f"  {path}" for path in written)]
+    return "\n".join(lines) + "\n"

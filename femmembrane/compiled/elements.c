@@ -1,0 +1,598 @@
+/*
+ * The elements of one space under one tape: evaluation, assembly and the bordered Newton corrector.
+ *
+ * Everything is read off arrays: which unknown a local coefficient is, tables of shape functions, data at the quadrature points. Elements
+ * are taken four at a time, one a lane, so that assembly has no short loops; points are numbered quadrature point first, element second.
+ */
+#include "native.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LANES 4
+/* points evaluated in one go: a block and the registers of the tape stay in the processor's cache */
+#define POINTS 256
+/* rows of the point function: energies and volume, two gradients, second derivatives, stresses */
+enum { N_SUMS = 3, N_FORCE = 8, N_STIFF = 10, N_STRESS = 2, N_DENSITY = N_FORCE + N_STIFF + N_STRESS, N_ROWS = N_SUMS + N_DENSITY };
+
+typedef struct {
+    PyObject_HEAD
+    Tape tape;
+    Py_ssize_t n_free, n_points, n_elements, block;
+    int kd, n_quadrature, n_local; /* n_local: shape functions of one component */
+    int n_data;
+    double *data;         /* point data, block after block, (n_data, n_quadrature, elements of the block) */
+    int32_t *gather;      /* (n_elements, 2 n_local); n_free is what is held at zero */
+    uint8_t *field;       /* (n_free) 0 for u, 1 for w */
+    double *table;        /* (2 n_quadrature, n_local) values, then slopes */
+    double *transposed;   /* (n_local, 2 n_quadrature) */
+    double *magnitudes;   /* of the transposed table */
+    double *scalars, *registers, *scratch, *sums;
+    double **pointers;
+    double *local, *coefficients;
+} Elements;
+
+static double *doubles(size_t count)
+{
+    return calloc(count + LANES, sizeof(double));
+}
+
+/* ---- evaluation ---------------------------------------------------------------------------------------------------------------- */
+
+/* out[r][e] = sum_k m[r][k] x[k][e]; x is readable up to the next multiple of LANES */
+static void product(const double *m, int rows, int depth, const double *x, Py_ssize_t ldx, double *out, Py_ssize_t lanes)
+{
+    for (Py_ssize_t g = 0; g < lanes; g += LANES) {
+        const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
+        for (int r = 0; r < rows; r++) {
+            double sum[LANES] = {0};
+            for (int k = 0; k < depth; k++)
+                for (int l = 0; l < LANES; l++)
+                    sum[l] += m[r * depth + k] * x[k * ldx + g + l];
+            memcpy(out + r * lanes + g, sum, sizeof(double) * valid);
+        }
+    }
+}
+
+/* target[unknown] += sum_k transposed[i][k] density[k][e] for both components of the elements from `first` on */
+static void integrate(const Elements *s, const double *transposed, const double *density, Py_ssize_t first, Py_ssize_t lanes, double *target)
+{
+    const int nl = s->n_local, depth = 2 * s->n_quadrature;
+    for (Py_ssize_t g = 0; g < lanes; g += LANES) {
+        const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
+        const int32_t *gather = s->gather + (first + g) * 2 * nl;
+        for (int i = 0; i < 2 * nl; i++) {
+            const double *row = transposed + (i % nl) * depth, *d = density + (i < nl ? 0 : depth * lanes) + g;
+            double sum[LANES] = {0};
+            for (int k = 0; k < depth; k++)
+                for (int l = 0; l < LANES; l++)
+                    sum[l] += row[k] * d[k * lanes + l];
+            for (int l = 0; l < valid; l++)
+                target[gather[l * 2 * nl + i]] += sum[l];
+        }
+    }
+}
+
+static double total(const double *x, Py_ssize_t n)
+{
+    double s[4] = {0};
+    Py_ssize_t i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int l = 0; l < 4; l++)
+            s[l] += x[i + l];
+    for (; i < n; i++)
+        s[0] += x[i];
+    return (s[0] + s[1]) + (s[2] + s[3]);
+}
+
+static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py_ssize_t lanes)
+{
+    const int nl = s->n_local, nq = s->n_quadrature;
+    for (Py_ssize_t e = 0; e < lanes; e++) {
+        const int32_t *gather = s->gather + (first + e) * 2 * nl;
+        for (int a = 0; a < 2 * nl; a++)
+            s->coefficients[a * s->block + e] = gather[a] < s->n_free ? x[gather[a]] : 0.0;
+    }
+    product(s->table, 2 * nq, nl, s->coefficients, s->block, s->local, lanes);
+    product(s->table, 2 * nq, nl, s->coefficients + nl * s->block, s->block, s->local + 2 * nq * lanes, lanes);
+}
+
+/* values (3), gradients (2, n_free) and densities (20, n_points) at the unknowns x; parameters of the point function in place */
+static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *gradients, double *density)
+{
+    const int nq = s->n_quadrature;
+    const Tape *tape = &s->tape;
+    const Py_ssize_t n = s->n_free, spare = n + 1;
+    memcpy(s->scalars, tape->constants, sizeof(double) * tape->n_constants);
+    s->scalars[tape->n_constants] = parameters[0], s->scalars[tape->n_constants + 1] = parameters[1];
+    tape_scalars(tape, s->scalars);
+    memset(s->sums, 0, sizeof(double) * 2 * spare);
+    values[0] = values[1] = values[2] = 0.0;
+    for (Py_ssize_t first = 0; first < s->n_elements; first += s->block) {
+        const Py_ssize_t lanes = s->n_elements - first < s->block ? s->n_elements - first : s->block, points = lanes * nq;
+        interpolate(s, x, first, lanes);
+        for (int k = 0; k < s->n_data; k++)
+            s->pointers[k] = s->data + first * nq * s->n_data + k * points;
+        for (Py_ssize_t k = 0; k < tape->n_registers - s->n_data; k++)
+            s->pointers[s->n_data + k] = (k < 4 ? s->local : s->registers - 4 * points) + k * points;
+        tape_run(tape, s->scalars, s->pointers, points);
+        const double *rows = s->pointers[s->n_data + 4];
+        for (int k = 0; k < N_SUMS; k++)
+            values[k] += total(rows + k * points, points);
+        const double *force = rows + N_SUMS * points;
+        integrate(s, s->transposed, force, first, lanes, s->sums);
+        integrate(s, s->transposed, force + 4 * points, first, lanes, s->sums + spare);
+        if (lanes == s->n_elements) {
+            memcpy(density, force, sizeof(double) * N_DENSITY * points);
+        } else {
+            for (int r = 0; r < N_DENSITY * nq; r++)
+                memcpy(density + r * s->n_elements + first, force + r * lanes, sizeof(double) * lanes);
+        }
+    }
+    memcpy(gradients, s->sums, sizeof(double) * n);
+    memcpy(gradients + n, s->sums + spare, sizeof(double) * n);
+}
+
+/* largest sum of absolute forces |E'| + |P| |V'| that meet at an unknown of each component */
+static void force_scale(const Elements *s, const double *force, double pressure, double scale[2])
+{
+    const int nq = s->n_quadrature, rows = 4 * nq;
+    const Py_ssize_t step = s->block, ne = s->n_elements;
+    double *part = s->registers; /* free between evaluations, and no smaller */
+    memset(s->sums, 0, sizeof(double) * (s->n_free + 1));
+    for (Py_ssize_t first = 0; first < ne; first += step) {
+        const Py_ssize_t lanes = ne - first < step ? ne - first : step;
+        for (int r = 0; r < rows; r++) {
+            const double *a = force + r * ne + first, *b = a + rows * ne;
+            for (Py_ssize_t e = 0; e < lanes; e++)
+                part[r * lanes + e] = fabs(a[e]) + fabs(pressure) * fabs(b[e]);
+        }
+        integrate(s, s->magnitudes, part, first, lanes, s->sums);
+    }
+    scale[0] = scale[1] = 0.0;
+    for (Py_ssize_t i = 0; i < s->n_free; i++)
+        if (!(s->sums[i] <= scale[s->field[i]]))
+            scale[s->field[i]] = s->sums[i];
+}
+
+/* ---- assembly of second derivatives, (10, n_quadrature, n_elements) ------------------------------------------------------------- */
+
+/* where a pair of local variables (u, u_x, w, w_x) stands among the second derivatives */
+static const int PAIR[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
+
+/* Added to the lower triangle by columns, at (column step + row - column + above), and where `above` is not 0 to the upper one as well. */
+static void assemble(const Elements *s, const double *density, double *band, Py_ssize_t step, Py_ssize_t above)
+{
+    const int nl = s->n_local, nq = s->n_quadrature, depth = 2 * nq;
+    const Py_ssize_t ne = s->n_elements, n = s->n_free;
+    double *d = s->scratch, *t = d + N_STIFF * nq * LANES; /* t: (2 n_quadrature, 2 n_local, lanes) */
+    for (Py_ssize_t first = 0; first < ne; first += LANES) {
+        const int valid = ne - first < LANES ? (int)(ne - first) : LANES;
+        const int32_t *gather = s->gather + first * 2 * nl;
+        for (int r = 0; r < N_STIFF * nq; r++)
+            for (int l = 0; l < valid; l++)
+                d[r * LANES + l] = density[r * ne + first + l];
+        for (int component = 0; component < 2; component++) {
+            const int from = component * nl; /* the lower block of w against u is the transposed upper one */
+            for (int side = 0; side < 2; side++)
+                for (int q = 0; q < nq; q++) {
+                    double *row = t + (side * nq + q) * 2 * nl * LANES;
+                    for (int other = component; other < 2; other++) {
+                        const double *a = d + (PAIR[2 * component + side][2 * other] * nq + q) * LANES;
+                        const double *b = d + (PAIR[2 * component + side][2 * other + 1] * nq + q) * LANES;
+                        for (int j = 0; j < nl; j++)
+                            for (int l = 0; l < LANES; l++)
+                                row[(other * nl + j) * LANES + l] = a[l] * s->table[q * nl + j] + b[l] * s->table[(nq + q) * nl + j];
+                    }
+                }
+            for (int i = from; i < from + nl; i++)
+                for (int j = i; j < 2 * nl; j++) {
+                    double sum[LANES] = {0};
+                    const double *row = s->transposed + (i - from) * depth, *column = t + j * LANES;
+                    for (int k = 0; k < depth; k++)
+                        for (int l = 0; l < LANES; l++)
+                            sum[l] += row[k] * column[k * 2 * nl * LANES + l];
+                    for (int l = 0; l < valid; l++) {
+                        const Py_ssize_t a = gather[l * 2 * nl + i], b = gather[l * 2 * nl + j];
+                        if (a < n && b < n) {
+                            const Py_ssize_t low = a < b ? a : b, high = a < b ? b : a;
+                            band[low * step + above + high - low] += sum[l];
+                            if (above && a != b)
+                                band[high * step + above + low - high] += sum[l];
+                        }
+                    }
+                }
+        }
+    }
+}
+
+/* ---- the corrector -------------------------------------------------------------------------------------------------------------- */
+
+/* N(x, P): row . (x - reference) + corner (P - held) + offset, or (a P + b) (V + c) - d */
+typedef struct {
+    int product, anywhere; /* anywhere: nobody asked for a particular value */
+    double a, b, c, d, corner, held, offset;
+    Py_buffer row, reference;
+} Control;
+
+static int control_init(Control *c, PyObject *asked, Py_ssize_t n)
+{
+    PyObject *row, *reference;
+    memset(c, 0, sizeof *c);
+    if (PyTuple_Size(asked) == 4) {
+        c->product = 1;
+        return PyArg_ParseTuple(asked, "dddd", &c->a, &c->b, &c->c, &c->d) ? 0 : -1;
+    }
+    if (!PyArg_ParseTuple(asked, "OOdddp", &row, &reference, &c->corner, &c->held, &c->offset, &c->anywhere))
+        return -1;
+    if (row != Py_None && take_array(row, &c->row, 'd', n, 0, "row") < 0)
+        return -1;
+    return reference == Py_None ? 0 : take_array(reference, &c->reference, 'd', n, 0, "reference");
+}
+
+/* gap, with the row and the corner written into the border */
+static double control_equation(const Control *c, Py_ssize_t n, const double *x, double p, double volume, const double *vg, double *row, double *corner)
+{
+    if (c->product) {
+        const double absolute = c->a * p + c->b, whole = volume + c->c;
+        for (Py_ssize_t i = 0; i < n; i++)
+            row[i] = absolute * vg[i];
+        *corner = c->a * whole;
+        return absolute * whole - c->d;
+    }
+    double gap = 0.0;
+    *corner = c->corner;
+    if (c->row.buf == NULL) {
+        memset(row, 0, sizeof(double) * n);
+    } else {
+        memcpy(row, c->row.buf, sizeof(double) * n);
+        const double *reference = c->reference.buf;
+        for (Py_ssize_t i = 0; i < n; i++)
+            gap += row[i] * (reference == NULL ? x[i] : x[i] - reference[i]);
+    }
+    return gap + c->corner * (p - c->held) + c->offset;
+}
+
+static int all_finite(const double *x, Py_ssize_t n)
+{
+    double s[4] = {0};
+    Py_ssize_t i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int l = 0; l < 4; l++)
+            s[l] += x[i + l] * 0.0;
+    for (; i < n; i++)
+        s[0] += x[i] * 0.0;
+    return s[0] + s[1] + s[2] + s[3] == 0.0;
+}
+
+/* largest change of u and of w, each relative to its own size */
+static double relative_size(const Elements *s, const double *dx, const double *x)
+{
+    double change[2] = {0}, size[2] = {0}, largest = 0.0;
+    for (Py_ssize_t i = 0; i < s->n_free; i++) {
+        const int f = s->field[i];
+        const double a = fabs(dx[i]), b = fabs(x[i]);
+        if (!(a < HUGE_VAL))
+            return HUGE_VAL;
+        change[f] = a > change[f] ? a : change[f];
+        size[f] = b > size[f] ? b : size[f];
+    }
+    for (int f = 0; f < 2; f++)
+        if (change[f] > 0.0) {
+            const double c = change[f] / (size[f] > change[f] ? size[f] : change[f]);
+            largest = c > largest ? c : largest;
+        }
+    return largest;
+}
+
+static double relative_residual(const Elements *s, const double *residual, const double *force, double pressure)
+{
+    double scale[2], size[2] = {0}, largest = 0.0;
+    force_scale(s, force, pressure, scale);
+    for (Py_ssize_t i = 0; i < s->n_free; i++) {
+        const double a = fabs(residual[i]);
+        if (!(a <= size[s->field[i]]))
+            size[s->field[i]] = a;
+    }
+    for (int f = 0; f < 2; f++) {
+        const double part = scale[f] == 0.0 ? 0.0 : size[f] / scale[f];
+        if (!(part < HUGE_VAL))
+            return HUGE_VAL;
+        largest = part > largest ? part : largest;
+    }
+    return largest;
+}
+
+/* factors of K at the densities, with the column -V' and the row and corner in place; -1 without memory */
+static int bordered(const Elements *s, Border *b, const double *stiffness, const double *volume_gradient, double corner)
+{
+    Factor *f = &b->factor;
+    const Py_ssize_t n = s->n_free;
+    free(f->lu), free(f->swaps);
+    f->lu = NULL, f->swaps = NULL;
+    memset(f->lower, 0, sizeof(double) * (s->kd + 1) * n);
+    assemble(s, stiffness, f->lower, s->kd + 1, 0);
+    if (factor_symmetric(f) < 0) {
+        const int depth = 3 * s->kd + 1;
+        double *band = doubles((size_t)depth * n);
+        if (band == NULL)
+            return -1;
+        assemble(s, stiffness, band, depth, 2 * s->kd);
+        const int failed = factor_general(f, band);
+        free(band);
+        if (failed)
+            return -1;
+    }
+    for (Py_ssize_t i = 0; i < n; i++)
+        b->column[i] = -volume_gradient[i];
+    border_set(b, corner);
+    return 0;
+}
+
+typedef struct {
+    double pressure, values[3], correction, residual, gap;
+    int iterations, converged, factored;
+} Result;
+
+/* Mirror of solve/newton.py, undamped: what each line is for stands there. */
+static int correct(const Elements *s, const Control *control, double *x, double *parameters, double tolerance, double confirmed,
+                   int max_iterations, double *gradients, double *density, Border *b, double *work, Result *r)
+{
+    const Py_ssize_t n = s->n_free, np = s->n_points;
+    double *force = work, *dx = force + n, *row = dx + n, corner, previous = HUGE_VAL;
+    const double *vg = gradients + n, *stiffness = density + N_FORCE * np;
+    double p = parameters[0];
+    r->iterations = r->converged = r->factored = 0;
+    evaluate(s, x, parameters, r->values, gradients, density);
+    for (;;) {
+        for (Py_ssize_t i = 0; i < n; i++)
+            force[i] = gradients[i] - p * vg[i];
+        r->gap = control_equation(control, n, x, p, r->values[2], vg, b->row, &corner);
+        r->factored = 0;
+        if (!all_finite(force, n) || !all_finite(stiffness, N_STIFF * np)) {
+            r->correction = r->residual = HUGE_VAL;
+            break;
+        }
+        if (bordered(s, b, stiffness, vg, corner) < 0)
+            return -1;
+        r->factored = 1;
+        for (Py_ssize_t i = 0; i < n; i++)
+            force[i] = -force[i];
+        const double dp = border_solve(b, force, -r->gap, dx), size = relative_size(s, dx, x);
+        const int met = control->anywhere || fabs(r->gap) <= 1e-14 * (fabs(dot(b->row, x, n)) + fabs(corner * p));
+        const int done = size <= tolerance && (met || previous <= tolerance);
+        const int stalled = !(size < HUGE_VAL) || (size > 0.5 * previous && size > 1e3 * tolerance);
+        if (done || stalled || r->iterations == max_iterations) {
+            r->converged = done;
+            r->correction = size;
+            r->residual = relative_residual(s, force, density, p);
+            break;
+        }
+        for (Py_ssize_t i = 0; i < n; i++)
+            x[i] += dx[i];
+        parameters[0] = p += dp;
+        evaluate(s, x, parameters, r->values, gradients, density);
+        r->iterations++;
+        const double ratio = size / previous, foretold = size * (previous == HUGE_VAL ? (size < 1.0 ? size : 1.0) : ratio * ratio);
+        if (foretold <= tolerance / 10) {
+            for (Py_ssize_t i = 0; i < n; i++)
+                force[i] = gradients[i] - p * vg[i];
+            if (all_finite(force, n) && all_finite(stiffness, N_STIFF * np)) {
+                r->residual = relative_residual(s, force, density, p);
+                if (r->residual <= confirmed) {
+                    double unused;
+                    r->gap = control_equation(control, n, x, p, r->values[2], vg, row, &unused);
+                    r->converged = 1, r->correction = foretold;
+                    break;
+                }
+            }
+        }
+        previous = size;
+    }
+    r->pressure = p;
+    return 0;
+}
+
+/* ---- Python --------------------------------------------------------------------------------------------------------------------- */
+
+static void elements_dealloc(PyObject *self)
+{
+    Elements *s = (Elements *)self;
+    PyTypeObject *type = Py_TYPE(self);
+    tape_free(&s->tape);
+    free(s->data), free(s->gather), free(s->field), free(s->table), free(s->scalars), free(s->registers), free(s->scratch);
+    free(s->sums), free(s->pointers), free(s->local), free(s->coefficients);
+    PyObject_Free(self);
+    Py_DECREF(type);
+}
+
+static int elements_fill(Elements *s, const double *data, const int64_t *gather, const double *table, const int64_t *field)
+{
+    const int nq = s->n_quadrature, nl = s->n_local;
+    const Py_ssize_t ne = s->n_elements, cells = (Py_ssize_t)2 * nq * nl;
+    const Py_ssize_t most = POINTS / nq < LANES ? LANES : POINTS / nq / LANES * LANES;
+    s->block = ne < most ? ne : most;
+    const size_t points = (size_t)s->block * nq;
+    s->data = doubles(s->n_data * s->n_points), s->table = doubles(3 * cells), s->local = doubles(4 * points);
+    s->gather = malloc(sizeof(int32_t) * (ne * 2 * nl + 1)), s->field = malloc(s->n_free + 1);
+    s->scalars = doubles(s->tape.n_scalars + 2), s->registers = doubles((s->tape.n_registers - s->n_data - 4) * points);
+    s->scratch = doubles((size_t)(N_STIFF * nq + 2 * nq * 2 * nl) * LANES), s->sums = doubles(2 * (s->n_free + 1));
+    s->pointers = calloc(s->tape.n_registers + 1, sizeof(double *)), s->coefficients = doubles(2 * nl * s->block);
+    if (!(s->data && s->table && s->local && s->gather && s->field && s->scalars && s->registers && s->scratch && s->sums && s->pointers &&
+          s->coefficients)) {
+        PyErr_NoMemory();
+        return -1;
+    }
+    s->transposed = s->table + cells, s->magnitudes = s->transposed + cells;
+    for (int r = 0; r < 2 * nq; r++)
+        for (int a = 0; a < nl; a++) { /* the table of both components is made of blocks: that of u comes first */
+            const double v = table[(Py_ssize_t)r * 2 * nl + a];
+            s->table[r * nl + a] = s->transposed[a * 2 * nq + r] = v;
+            s->magnitudes[a * 2 * nq + r] = fabs(v);
+        }
+    for (Py_ssize_t e = 0; e < ne; e++)
+        for (int a = 0; a < 2 * nl; a++) {
+            const int64_t g = gather[a * ne + e];
+            if (g < 0 || g > s->n_free) {
+                PyErr_SetString(PyExc_ValueError, "gather: an unknown does not exist");
+                return -1;
+            }
+            s->gather[e * 2 * nl + a] = (int32_t)g;
+        }
+    for (Py_ssize_t e = 0; e < ne; e++)
+        for (int a = 0; a < 2 * nl; a++)
+            for (int b = 0; b < 2 * nl; b++) {
+                const int32_t i = s->gather[e * 2 * nl + a], j = s->gather[e * 2 * nl + b];
+                if (i < s->n_free && j < s->n_free && (i - j > s->kd || j - i > s->kd)) {
+                    PyErr_SetString(PyExc_ValueError, "gather: unknowns of one element are farther apart than the half bandwidth");
+                    return -1;
+                }
+            }
+    for (Py_ssize_t i = 0; i < s->n_free; i++)
+        s->field[i] = field[i] != 0;
+    for (Py_ssize_t first = 0; first < ne; first += s->block) {
+        const Py_ssize_t lanes = ne - first < s->block ? ne - first : s->block;
+        for (int k = 0; k < s->n_data; k++)
+            for (int q = 0; q < nq; q++)
+                memcpy(s->data + first * nq * s->n_data + (k * nq + q) * lanes, data + (k * nq + q) * ne + first, sizeof(double) * lanes);
+    }
+    return 0;
+}
+
+/* Elements(tape, data, gather, table, field, n_quadrature, n_local, half bandwidth): numbers of points and unknowns by their sizes */
+static PyObject *elements_new(PyTypeObject *type, PyObject *args, PyObject *kwargs)
+{
+    PyObject *tape, *data, *gather, *table, *field;
+    Py_buffer d = {0}, g = {0}, t = {0}, f = {0};
+    int nq, nl, kd;
+    (void)kwargs;
+    if (!PyArg_ParseTuple(args, "O!OOOOiii", &PyTuple_Type, &tape, &data, &gather, &table, &field, &nq, &nl, &kd))
+        return NULL;
+    if (nq < 1 || nl < 1 || kd < 0) {
+        PyErr_SetString(PyExc_ValueError, "no elements have these sizes");
+        return NULL;
+    }
+    allocfunc allocate = PyType_GetSlot(type, Py_tp_alloc);
+    Elements *s = (Elements *)allocate(type, 0);
+    if (s == NULL)
+        return NULL;
+    s->n_quadrature = nq, s->n_local = nl, s->kd = kd;
+    int bad = tape_init(&s->tape, tape) < 0 || take_array(gather, &g, 'l', -1, 0, "gather") < 0 || take_array(field, &f, 'l', -1, 0, "field") < 0;
+    if (!bad) {
+        s->n_elements = g.len / (8 * 2 * nl), s->n_free = f.len / 8, s->n_points = s->n_elements * nq;
+        s->n_data = (int)s->tape.n_inputs - 4;
+        bad = take_array(data, &d, 'd', s->n_data * s->n_points, 0, "data") < 0 ||
+              take_array(table, &t, 'd', (Py_ssize_t)8 * nq * nl, 0, "table") < 0;
+        if (!bad && (s->tape.n_outputs != N_ROWS || s->n_data < 0 || s->tape.n_parameters != 2)) {
+            PyErr_SetString(PyExc_ValueError, "the tape is not that of a potential");
+            bad = 1;
+        }
+    }
+    bad = bad || elements_fill(s, d.buf, g.buf, t.buf, f.buf) < 0;
+    PyBuffer_Release(&d), PyBuffer_Release(&g), PyBuffer_Release(&t), PyBuffer_Release(&f);
+    if (bad)
+        Py_CLEAR(s);
+    return (PyObject *)s;
+}
+
+/* evaluate(x, parameters, gradients, densities): (elastic, magnetic, volume) */
+static PyObject *elements_evaluate(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    PyObject *o[4];
+    Py_buffer x = {0}, p = {0}, g = {0}, d = {0};
+    double values[3];
+    if (!PyArg_ParseTuple(args, "OOOO", &o[0], &o[1], &o[2], &o[3]))
+        return NULL;
+    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &p, 'd', 2, 0, "parameters") < 0 ||
+                    take_array(o[2], &g, 'd', 2 * s->n_free, 1, "gradients") < 0 ||
+                    take_array(o[3], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
+    if (!bad)
+        evaluate(s, x.buf, p.buf, values, g.buf, d.buf);
+    PyBuffer_Release(&x), PyBuffer_Release(&p), PyBuffer_Release(&g), PyBuffer_Release(&d);
+    return bad ? NULL : Py_BuildValue("(ddd)", values[0], values[1], values[2]);
+}
+
+/* at_quadrature(x, out): (u, u_x, w, w_x) at the quadrature points, shape (4, n_points) */
+static PyObject *elements_at_quadrature(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    PyObject *source, *target;
+    Py_buffer x = {0}, out = {0};
+    if (!PyArg_ParseTuple(args, "OO", &source, &target))
+        return NULL;
+    const int bad = take_array(source, &x, 'd', s->n_free, 0, "x") < 0 || take_array(target, &out, 'd', 4 * s->n_points, 1, "out") < 0;
+    for (Py_ssize_t first = 0; !bad && first < s->n_elements; first += s->block) {
+        const Py_ssize_t lanes = s->n_elements - first < s->block ? s->n_elements - first : s->block;
+        interpolate(s, x.buf, first, lanes);
+        for (int r = 0; r < 4 * s->n_quadrature; r++)
+            memcpy((double *)out.buf + r * s->n_elements + first, s->local + r * lanes, sizeof(double) * lanes);
+    }
+    PyBuffer_Release(&x), PyBuffer_Release(&out);
+    return bad ? NULL : Py_NewRef(Py_None);
+}
+
+/* assemble(stiffness, band): the second derivatives into general band storage, shape (n_free, 3 kd + 1) of zeros */
+static PyObject *elements_assemble(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    PyObject *density, *band;
+    Py_buffer d = {0}, b = {0};
+    if (!PyArg_ParseTuple(args, "OO", &density, &band))
+        return NULL;
+    const int bad = take_array(density, &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
+                    take_array(band, &b, 'd', s->n_free * (3 * s->kd + 1), 1, "band") < 0;
+    if (!bad)
+        assemble(s, d.buf, b.buf, 3 * s->kd + 1, 2 * s->kd);
+    PyBuffer_Release(&d), PyBuffer_Release(&b);
+    if (bad)
+        return NULL;
+    Py_RETURN_NONE;
+}
+
+/*
+ * correct(control, x, parameters, tolerance, residual, max_iterations, gradients, densities): x is replaced by the solution. Answers
+ * (converged, pressure, elastic, magnetic, volume, iterations, correction, residual, gap, Border or None).
+ */
+static PyObject *elements_correct(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    const Py_ssize_t n = s->n_free;
+    PyObject *asked, *o[4], *answer = NULL;
+    Py_buffer x = {0}, p = {0}, g = {0}, d = {0};
+    Control control;
+    double tolerance, confirmed;
+    int most;
+    if (!PyArg_ParseTuple(args, "O!OOddiOO", &PyTuple_Type, &asked, &o[0], &o[1], &tolerance, &confirmed, &most, &o[2], &o[3]))
+        return NULL;
+    const int bad = control_init(&control, asked, n) < 0 || take_array(o[0], &x, 'd', n, 1, "x") < 0 ||
+                    take_array(o[1], &p, 'd', 2, 1, "parameters") < 0 || take_array(o[2], &g, 'd', 2 * n, 1, "gradients") < 0 ||
+                    take_array(o[3], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
+    if (!bad) {
+        Result r;
+        double *work = malloc(sizeof(double) * 3 * (n + 1));
+        BorderObject *border = PyObject_New(BorderObject, types.border);
+        const int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0 || work == NULL ||
+                            correct(s, &control, x.buf, p.buf, tolerance, confirmed, most, g.buf, d.buf, &border->border, work, &r) < 0;
+        free(work);
+        if (without) {
+            PyErr_NoMemory();
+        } else {
+            answer = Py_BuildValue("(NddddidddO)", PyBool_FromLong(r.converged), r.pressure, r.values[0], r.values[1], r.values[2],
+                                   r.iterations, r.correction, r.residual, r.gap, r.factored ? (PyObject *)border : Py_None);
+        }
+        Py_XDECREF((PyObject *)border);
+    }
+    PyBuffer_Release(&control.row), PyBuffer_Release(&control.reference);
+    PyBuffer_Release(&x), PyBuffer_Release(&p), PyBuffer_Release(&g), PyBuffer_Release(&d);
+    return answer;
+}
+
+static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadrature, METH_VARARGS, NULL},
+                                         {"evaluate", elements_evaluate, METH_VARARGS, NULL},
+                                         {"assemble", elements_assemble, METH_VARARGS, NULL},
+                                         {"correct", elements_correct, METH_VARARGS, NULL},
+                                         {NULL, NULL, 0, NULL}};
+static PyType_Slot elements_slots[] = {
+    {Py_tp_new, elements_new}, {Py_tp_dealloc, elements_dealloc}, {Py_tp_methods, elements_methods}, {0, NULL}};
+PyType_Spec elements_spec = {"femmembrane._native.Elements", sizeof(Elements), 0, Py_TPFLAGS_DEFAULT, elements_slots};

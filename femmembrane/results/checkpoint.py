@@ -1,0 +1,131 @@
+"""An unfinished run on disk: ``checkpoint.nc``, from which it is resumed, and whether that is the run that is asked for.
+
+A checkpoint is a branch file like any other (:mod:`.store`), so that the run can be looked at while it goes on; beside the equilibria it
+holds the memory that predicts the next one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from .store import load, save
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+    from .records import Branch
+
+NAME = "checkpoint.nc"
+#: seconds of work that may be lost, unless saving takes long
+PAUSE = 2.0
+#: part of the time of a run that saving may take
+SHARE = 0.05
+
+
+class Checkpoints:
+    """Keeps the branch so far, and now and then saves it; made to be called after each equilibrium.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the checkpoint is saved.
+    latest : Branch, optional
+        What the run was resumed from.
+    """
+
+    def __init__(self, folder: Path, latest: Branch | None = None) -> None:
+        self.path, self.latest = folder / NAME, latest
+        self._due = time.perf_counter() + PAUSE
+
+    def __call__(self, branch: Branch) -> None:
+        self.latest = branch
+        if time.perf_counter() >= self._due:
+            clock = time.perf_counter()
+            with contextlib.suppress(OSError, InputError):  # room may be found before the end, and hours of work do not stop for this
+                self.save()
+            now = time.perf_counter()
+            self._due = now + max(PAUSE, (now - clock) / SHARE)
+
+    def save(self) -> bool:
+        """Save the branch so far; whether there is one.
+
+        Raises
+        ------
+        InputError, OSError
+            When it cannot be written; the checkpoint before stays.
+        """
+        if self.latest is None:
+            return False
+        save(self.latest, self.path)
+        return True
+
+    def remove(self) -> None:
+        """Remove it: the run has come to its end."""
+        self.path.unlink(missing_ok=True)
+
+
+def unfinished(folder: Path) -> Branch | None:
+    """The branch from which the run in a folder can go on, None without one.
+
+    Raises
+    ------
+    InputError
+        When there is a checkpoint that cannot be read.
+    """
+    path = folder / NAME
+    if not path.exists():
+        return None
+    try:
+        return load(path)
+    except InputError as error:
+        raise InputError("--resume", str(path), f"{error.allowed}; without --resume the run starts over") from error
+
+
+def same_scene(asked: Scene, kept: Branch, key: str) -> Scene:
+    """The scene of a kept branch, which may have a mesh chosen for the accuracy that is asked for.
+
+    Raises
+    ------
+    InputError
+        When it is not the scene asked for, naming all that differs.
+    """
+    refuse_others(asked, kept.scene.to_dict(), key)
+    return kept.scene
+
+
+def refuse_others(asked: Scene, kept: Mapping[str, Any], key: str) -> None:
+    """Refuse to go on with another scene, given by its tables.
+
+    Raises
+    ------
+    InputError
+        Naming all that differs.
+    """
+    here, there = (dict(_flat(tables)) for tables in (asked.to_dict(), kept))
+    if asked.open and here.get("mesh.accuracy") == there.get("mesh.accuracy"):  # the mesh that was chosen for it
+        here, there = ({k: v for k, v in keys.items() if not k.startswith("mesh.")} for keys in (here, there))
+    differing = [name for name in sorted(here.keys() | there.keys()) if here.get(name) != there.get(name)]
+    if differing:
+        words = "; ".join(f"{name} is {_word(here, name)}, was {_word(there, name)}" for name in differing)
+        advice = "go on with the scene it was begun with, choose another folder, or start over"
+        raise InputError(key, asked.title or "this scene", f"the run to be resumed has another scene: {words}; {advice}")
+
+
+def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _flat(item, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+        for k, item in enumerate(value):
+            yield from _flat(item, path if len(value) == 1 else f"{path}[{k}]")
+    else:
+        yield path, value
+
+
+def _word(keys: Mapping[str, Any], key: str) -> str:
+    text = repr(keys[key]) if key in keys else "left out"
+    return text if len(text) <= 40 else text[:37] + "..."

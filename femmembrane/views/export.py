@@ -1,0 +1,180 @@
+"""A branch for other programs: surfaces as VTU, PVD, XDMF, STL and OBJ, meridians as CSV.
+
+=======  ==================================================================  ==========================
+suffix   what is in the file                                                 read by
+=======  ==================================================================  ==========================
+.pvd     all equilibria: a collection of VTU files in a folder beside it     ParaView
+.xdmf    all equilibria, the numbers in an HDF5 file beside it               ParaView, VisIt
+.vtu     one equilibrium with stretches and stresses                         ParaView, PyVista, meshio
+.stl     one equilibrium as triangles, nothing but its shape                 CAD, printing
+.obj     one equilibrium as triangles and quadrilaterals                     Blender and its like
+.csv     the deformed meridians with stretches and stresses, of all          anything
+         equilibria or of one
+=======  ==================================================================  ==========================
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..results.store import replace_file
+from .stage import place_of
+from .vtk import FIELDS, Array, Revolution, smooth_profile, surface_data, write_surface, write_vtk
+
+if TYPE_CHECKING:
+    from ..results.records import Branch, Equilibrium
+
+#: codes of XDMF's mixed topology
+_TRIANGLE, _QUAD = 4, 5
+
+
+def export(shown: Branch | Equilibrium, path: str | PathLike[str], *, step: int | None = None) -> list[Path]:
+    """Write a branch, or one equilibrium, in the format that the suffix names.
+
+    Parameters
+    ----------
+    shown : Branch or Equilibrium
+    path : path
+        Ends in one of ``.pvd``, ``.xdmf``, ``.vtu``, ``.stl``, ``.obj``, ``.csv``.
+    step : int, optional
+        The equilibrium of a file that holds one; negative ones count from the end. Default: the last for ``.vtu``, ``.stl`` and
+        ``.obj``, all for ``.csv``.
+
+    Returns
+    -------
+    list of Path
+        The files written, the one to open last.
+
+    Raises
+    ------
+    InputError
+        For an empty branch, another suffix, a step that is not there or that the format has no use for, and a file that cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    check_format(suffix)
+    branch = list(shown) if isinstance(shown, Sequence) else [shown]
+    if not branch:
+        raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
+    place = place_of(step, len(branch))
+    if suffix in _OF_ALL:
+        if step is not None:
+            raise InputError("step", step, f"not allowed with {suffix}, which holds all equilibria; .vtu, .stl and .obj hold one")
+        return _OF_ALL[suffix](branch, Path(path))
+    if suffix == ".csv":
+        numbers = range(len(branch)) if step is None else [place]
+        return _write_csv([(k, branch[k]) for k in numbers], Path(path))
+    _OF_ONE[suffix](branch[place], Path(path))
+    return [Path(path)]
+
+
+def check_format(suffix: str) -> None:
+    """Raise InputError for a suffix, with its dot, that names no format."""
+    if suffix not in FORMATS:
+        raise unknown_name("format", suffix.lstrip("."), [known.lstrip(".") for known in FORMATS])
+
+
+def _write_csv(shown: Sequence[tuple[int, Equilibrium]], path: Path) -> list[Path]:
+    """One line a node: step, loads, and the profile."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [name for name in ("r", "rho", "eta", *FIELDS) if name in shown[0][1].profile()]
+    writer.writerow(["step", "volume", "pressure", *names])
+    for number, equilibrium in shown:
+        profile = equilibrium.profile()
+        loads = [number, equilibrium.volume, equilibrium.pressure]
+        writer.writerows([*loads, *row] for row in zip(*(profile[name].tolist() for name in names), strict=True))
+    with replace_file(path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+    return [path]
+
+
+def _write_vtu(equilibrium: Equilibrium, path: Path) -> None:
+    write_surface(equilibrium, smooth_profile(equilibrium), path)
+
+
+def _write_stl(equilibrium: Equilibrium, path: Path) -> None:
+    import meshio
+
+    points, revolution = _surface(equilibrium)
+    halves = [revolution.quads[:, [0, 1, 2]], revolution.quads[:, [0, 2, 3]]]
+    mesh = meshio.Mesh(points, [("triangle", np.concatenate([revolution.triangles, *halves]))])
+    with replace_file(path) as temporary:
+        mesh.write(temporary, file_format="stl", binary=True)
+
+
+def _write_obj(equilibrium: Equilibrium, path: Path) -> None:
+    points, revolution = _surface(equilibrium)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+    lines += [
+        "f " + " ".join(str(point + 1) for point in cell) for cells in (revolution.triangles, revolution.quads) for cell in cells.tolist()
+    ]
+    with replace_file(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _surface(equilibrium: Equilibrium) -> tuple[Array, Revolution]:
+    profile = smooth_profile(equilibrium)
+    revolution = Revolution.of(profile["r"])
+    return revolution.vectors(profile["rho"], profile["eta"]), revolution
+
+
+def _write_pvd(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
+    return write_vtk(branch, path)
+
+
+def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
+    """A collection in time, one grid an equilibrium: common cells, own points and point data."""
+    import h5py
+
+    numbers, grids = path.with_suffix(".h5"), []
+    with replace_file(numbers) as temporary, h5py.File(temporary, "w") as file:
+        revolution = Revolution.of(smooth_profile(branch[0])["r"])
+        mixed = [
+            np.insert(cells, 0, code, axis=1).ravel() for code, cells in ((_TRIANGLE, revolution.triangles), (_QUAD, revolution.quads))
+        ]
+        file["cells"] = np.concatenate(mixed)
+        count = len(revolution.triangles) + len(revolution.quads)
+        topology = f'<Topology TopologyType="Mixed" NumberOfElements="{count}">{_item(numbers, file, "cells")}</Topology>'
+        for step, equilibrium in enumerate(branch):
+            profile = smooth_profile(equilibrium)
+            data = {"points": revolution.vectors(profile["rho"], profile["eta"]), **surface_data(equilibrium, profile, revolution)}
+            for name, values in data.items():
+                file.create_dataset(f"{step}/{name}", data=values, compression="gzip", compression_opts=1, shuffle=True)
+            grids.append(_grid(numbers, file, step, topology, data))
+    head = '<?xml version="1.0"?>\n<Xdmf Version="2.0"><Domain><Grid Name="steps" GridType="Collection" CollectionType="Temporal">\n'
+    with replace_file(path) as temporary:
+        temporary.write_text(head + "\n".join(grids) + "\n</Grid></Domain></Xdmf>\n", encoding="utf-8")
+    return [numbers, path]
+
+
+def _grid(numbers: Path, file: Mapping[str, Array], step: int, topology: str, data: Mapping[str, Array]) -> str:
+    parts = [topology, f'<Geometry GeometryType="XYZ">{_item(numbers, file, f"{step}/points")}</Geometry>']
+    for name, values in data.items():
+        if name != "points":
+            kind = "Vector" if values.ndim > 1 else "Scalar"
+            item = _item(numbers, file, f"{step}/{name}")
+            parts.append(f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="Node">{item}</Attribute>')
+    return f'<Grid Name="step {step}"><Time Value="{step}"/>\n' + "\n".join(parts) + "\n</Grid>"
+
+
+def _item(numbers: Path, file: Mapping[str, Array], name: str) -> str:
+    values = file[name]
+    kind = "Float" if values.dtype.kind == "f" else "Int"
+    size = " ".join(str(length) for length in values.shape)
+    text = f"{numbers.name}:/{name}".replace("&", "&amp;").replace("<", "&lt;")
+    return f'<DataItem Format="HDF" NumberType="{kind}" Precision="{values.dtype.itemsize}" Dimensions="{size}">{text}</DataItem>'
+
+
+_OF_ALL: dict[str, Callable[[Sequence[Equilibrium], Path], list[Path]]] = {".pvd": _write_pvd, ".xdmf": _write_xdmf}
+_OF_ONE: dict[str, Callable[[Equilibrium, Path], None]] = {".vtu": _write_vtu, ".stl": _write_stl, ".obj": _write_obj}
+#: suffixes of all formats
+FORMATS = (*_OF_ALL, *_OF_ONE, ".csv")

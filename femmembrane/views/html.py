@@ -1,0 +1,87 @@
+"""Pieces of a page: text that is escaped, and tables that scroll on their own where a page is narrow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..results.records import Branch, Equilibrium
+
+#: most rows of a table of equilibria
+MOST_ROWS = 60
+#: headings of the columns of a branch
+HEADINGS = {
+    "volume": "V",
+    "pressure": "P",
+    "center_height": "pole height",
+    "elastic_energy": "elastic energy",
+    "magnetic_energy": "magnetic energy",
+}
+
+
+def text(value: Any) -> str:
+    """A value as a person reads it, escaped."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (float, np.floating)):
+        return "–" if np.isnan(value) else f"{value:.6g}".replace("-", "−")  # noqa: RUF001
+    if isinstance(value, (list, tuple)):
+        return ", ".join(text(item) for item in value)
+    return escape(str(value))
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = "") -> str:
+    """A table whose numbers stand at the right."""
+    cells = [list(row) for row in rows]
+    numbers = [all(not isinstance(row[k], str) for row in cells) for k in range(len(header))]
+    kinds = [' class="number"' if number else "" for number in numbers]
+    head = "".join(f'<th scope="col"{kind}>{escape(name)}</th>' for name, kind in zip(header, kinds, strict=True))
+    body = "\n".join("<tr>" + "".join(_cell(value) for value in row) + "</tr>" for row in cells)
+    about = f"<caption>{escape(caption)}</caption>" if caption else ""
+    return f'<div class="scroll"><table>{about}<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
+
+
+def pairs(items: Iterable[tuple[str, Any]]) -> str:
+    """Names and values, one a line."""
+    lines = (f"<dt>{escape(name)}</dt><dd>{text(value)}</dd>" for name, value in items)
+    return f"<dl>{''.join(lines)}</dl>"
+
+
+def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[list[Any]]]:
+    """Headings and cells of the equilibria of a branch; where there are more than ``most``, so many, evenly spread."""
+    from ..results.table import columns, estimated, value
+
+    names = [name for name in columns(branch) if name not in ("iterations", "seconds")]
+    held, _ = estimated(branch.scene)
+    shown = {round(step) for step in np.linspace(0, len(branch) - 1, min(most, len(branch)))}
+    cells = [[value(branch[step], step, name, held) for name in names] for step in sorted(shown)]
+    return [HEADINGS.get(name, name.replace("_", " ")) for name in names], cells
+
+
+def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
+    """What an equilibrium is, with the verdicts that its scene asks for."""
+    analysis = equilibrium.scene.analysis
+    energies = [("elastic energy", equilibrium.elastic_energy)]
+    energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []
+    return [
+        ("volume V", equilibrium.volume),
+        ("pressure P", equilibrium.pressure),
+        ("pole height", equilibrium.center_height),
+        *energies,
+        ("residual", equilibrium.residual),
+        ("status", equilibrium.status),
+        *((f"under {control} control", equilibrium.verdict(control).reason) for control in analysis.stability),
+        *((f"against n = {n}", equilibrium.verdict(azimuthal=n).reason) for n in analysis.azimuthal_modes),
+        *([("zones", equilibrium.zones().summary)] if analysis.wrinkling else []),
+    ]
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, str):
+        kind = f' class="{value}"' if value in ("stable", "unstable", "marginal") else ""
+        return f"<td{kind}>{text(value)}</td>"
+    return f'<td class="number">{text(value)}</td>'

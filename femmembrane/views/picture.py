@@ -1,0 +1,302 @@
+"""The membrane in space, drawn without a display: a coloured surface, its circles, the sources around it, and where to look from.
+
+Colours come from maps whose lightness only rises, so that they are ordered in grey as well.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, unknown_name
+from ..results.store import MEANING, replace_file
+from ..stability.zones import KINDS
+from .stage import Box, clamped_ends, surroundings
+from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
+
+if TYPE_CHECKING:
+    import pyvista
+
+    from ..physics.outline import Outline
+    from ..results.records import Branch, Equilibrium
+    from ..scene import Scene
+
+Array = NDArray[np.float64]
+
+#: points along a drawn meridian with fewer nodes
+_POINTS = 101
+_MAP = "viridis"
+_SOURCE = "#b03060"
+#: little shading, so that the colours stay those of the scale
+_MATT: dict[str, Any] = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
+#: each kind of zones in the middle of its colour, and what it is called beside it
+_ZONE_LIMITS = (-0.5, len(KINDS) - 0.5)
+_ZONE_NAMES = ("taut", "radial", "circum-\nferential", "both\nways")
+#: nothing is rendered before all is there
+_STILL: dict[str, Any] = {"reset_camera": False, "render": False}
+#: height in pixels of a picture whose text has its plain size
+_PLAIN = 900
+
+
+def render(
+    shown: Branch | Equilibrium, path: str | PathLike[str], *, quantity: str = "stretch_2", size: tuple[int, int] = (1200, 900)
+) -> None:
+    """Draw an equilibrium (of a branch: the last one) as a coloured surface, without a display.
+
+    Parameters
+    ----------
+    shown : Branch or Equilibrium
+    path : path
+        PNG file to write.
+    quantity : str
+        What the colour shows: one of :data:`~femmembrane.views.vtk.FIELDS` (those in Pa only when the scene has scales), or "zone".
+    size : tuple of int
+        Width and height of the picture in pixels.
+
+    Raises
+    ------
+    InputError
+        For an empty branch, an unknown quantity, or a file that cannot be written.
+    """
+    surface = Surface.of(_one(shown), quantity)
+    with replace_file(path) as temporary, new_plotter(size) as plotter:
+        drawn = [*draw_surroundings(plotter, surface.equilibrium.scene, surface.box), surface.points]
+        draw_surface(plotter, surface, surface.range, surface.box.size)
+        draw_key(plotter, surface, surface.range)
+        aim(plotter, np.concatenate(drawn))
+        plotter.screenshot(str(temporary))
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """An equilibrium as a surface of revolution with the values that its colour shows.
+
+    Attributes
+    ----------
+    equilibrium : Equilibrium
+    quantity : str
+    rho, eta : ndarray, shape (n_nodes,)
+        The drawn meridian.
+    revolution : Revolution
+    values : ndarray
+        Of a quantity at the nodes; of "zone" between them: places in :data:`~femmembrane.stability.zones.KINDS`.
+    """
+
+    equilibrium: Equilibrium
+    quantity: str
+    rho: Array
+    eta: Array
+    revolution: Revolution
+    values: Array
+
+    @classmethod
+    def of(cls, equilibrium: Equilibrium, quantity: str, sectors: int = 4 * SECTORS) -> Surface:
+        """The surface of an equilibrium.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity.
+        """
+        check_quantity(quantity, equilibrium.scene)
+        if quantity == "zone":
+            zones, ends = equilibrium.zones(), equilibrium.scene.mesh.breakpoints()
+            s = np.unique(np.concatenate([np.linspace(ends[0], ends[-1], _POINTS), [zone.s[1] for zone in zones]]))
+            profile, values = equilibrium.profile(s), zones.numbers((s[1:] + s[:-1]) / 2).astype(np.float64)
+        else:
+            profile = smooth_profile(equilibrium, points=_POINTS)
+            values = profile[quantity]
+        return cls(equilibrium, quantity, profile["rho"], profile["eta"], Revolution.of(profile["r"], sectors), values)
+
+    @property
+    def points(self) -> Array:
+        """Positions, shape (n_points, 3)."""
+        return self.revolution.vectors(self.rho, self.eta)
+
+    @property
+    def box(self) -> Box:
+        return Box.of([{"rho": self.rho, "eta": self.eta}])
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value."""
+        return float(self.values.min()), float(self.values.max())
+
+
+def check_quantity(quantity: str, scene: Scene, key: str = "quantity") -> None:
+    """Raise InputError unless a colour can show the quantity."""
+    known = [name for name in FIELDS if scene.scales is not None or not name.endswith("_pa")]
+    if not isinstance(quantity, str) or quantity not in (*known, "zone"):
+        raise unknown_name(key, str(quantity), (*known, "zone"))
+
+
+@contextmanager
+def new_plotter(size: tuple[int, int], off_screen: bool = True) -> Iterator[pyvista.Plotter]:
+    """A white picture that is closed at the end."""
+    import pyvista
+
+    with pyvista.vtk_verbosity("off"):  # VTK reports a missing display before it does without
+        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size))
+        try:
+            plotter.set_background("white")
+            plotter.enable_anti_aliasing("ssaa")
+            yield plotter
+        finally:
+            plotter.close()
+
+
+def draw_surface(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, float], size: float) -> None:
+    """Draw a surface, the ends where it is held and a few circles, in place of the one drawn before.
+
+    Colours span the limits; lines are as thick as suits a membrane of the size.
+    """
+    import pyvista
+
+    points, revolution = surface.points, surface.revolution
+    mesh = polydata(revolution, points)
+    look: dict[str, Any] = {"show_scalar_bar": False, "name": "membrane", **_STILL, **_MATT}
+    if surface.quantity == "zone":
+        first = np.concatenate([revolution.node[cells].min(axis=1) for cells in (revolution.triangles, revolution.quads)])
+        mesh.cell_data["zone"] = surface.values[first]
+        look |= {"scalars": "zone", "clim": _ZONE_LIMITS, "cmap": list(zone_colors()), "preference": "cell"}
+    else:
+        mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
+        look |= {"scalars": surface.quantity, "clim": limits, "cmap": _MAP}
+    plotter.add_mesh(mesh, **look)
+    held = [node for node, _, _ in clamped_ends(surface.equilibrium, surface.rho.size)]
+    tubes = [
+        pyvista.lines_from_points(points[revolution.node == node], close=True).tube(radius=radius * size, n_sides=8)
+        for node, radius in circles(surface.rho, surface.eta, held)
+    ]
+    if tubes:
+        plotter.add_mesh(pyvista.merge(tubes), color="black", ambient=1.0, diffuse=0.0, name="circles", **_STILL)
+
+
+def circles(rho: Array, eta: Array, held: Sequence[int], count: int = 6) -> list[tuple[int, float]]:
+    """Nodes whose circles are drawn, with their thickness: ends that are held, and a few at equal distances along the meridian."""
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rho), np.diff(eta)))])
+    shown = np.searchsorted(length, length[-1] * np.arange(count + 1) / count).clip(max=rho.size - 1)
+    thin = [int(node) for node in np.unique(shown) if rho[node] > 1e-9 and node not in held]
+    return [*((node, 0.0015) for node in thin), *((node, 0.005) for node in held)]
+
+
+def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, float]) -> None:
+    """The scale of the colours with name and unit, or the kinds of zones."""
+    import pyvista
+
+    scale, zones = plotter.window_size[1] / _PLAIN, surface.quantity == "zone"
+    if zones:
+        table = pyvista.LookupTable(list(zone_colors()), n_values=len(KINDS), scalar_range=_ZONE_LIMITS)
+        table.annotations = dict(enumerate(_ZONE_NAMES))
+        criterion = surface.equilibrium.scene.analysis.wrinkling or "total"
+        title = f"wrinkles by {criterion} stress"
+    else:
+        table = pyvista.LookupTable(_MAP, scalar_range=limits)
+        meaning, unit = MEANING[surface.quantity]
+        title = meaning if unit == "1" else f"{meaning} in {unit}"
+    mapper = pyvista.DataSetMapper()
+    mapper.lookup_table, mapper.scalar_range = table, table.scalar_range
+    plotter.add_scalar_bar(
+        "\n".join(textwrap.wrap(title, 16)) + "\n",
+        mapper=mapper,
+        render=False,
+        vertical=True,
+        n_labels=0 if zones else 5,
+        fmt="%.3g",
+        color="black",
+        title_font_size=round(22 * scale),
+        label_font_size=round(20 * scale),
+        height=0.55,
+        width=0.07,
+        position_x=0.9 if zones else 0.85,  # its names stand on the left
+        position_y=0.15,
+    )
+
+
+def zone_colors() -> tuple[str, ...]:
+    """One colour a kind of zones, from light to dark."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return tuple(to_hex(colormaps[_MAP](0.95 - 0.3 * k)) for k in range(len(KINDS)))
+
+
+def draw_surroundings(plotter: pyvista.Plotter, scene: Scene, box: Box) -> list[Array]:
+    """The bodies of sources with arrows along their moments, and a line of text for each that is not drawn; the points of the bodies."""
+    around, drawn = surroundings(scene, box), []
+    for body in around.near:
+        for part in _parts(body, 0.1 * box.size):
+            plotter.add_mesh(part, color=_SOURCE, smooth_shading=True, ambient=0.3, **_STILL)
+            drawn.append(np.asarray(part.points))
+    if around.absent:
+        corner = tuple(0.03 * length for length in plotter.window_size)
+        text = "\n".join(f"{name} not shown" for name in around.absent)
+        plotter.add_text(text, position=corner, font_size=10 * plotter.window_size[1] / _PLAIN, color="black", render=False)
+    return drawn
+
+
+def _parts(body: Outline, size: float) -> list[Any]:
+    """Meshes of a body turned about the axis: a ball, a ring, a rod or a surface, and the arrow of its moment."""
+    import pyvista
+
+    rho, z = np.array(body.points).T
+    parts: list[Any] = []
+    if rho.size == 1 and rho[0] == 0:
+        parts.append(pyvista.Sphere(radius=0.3 * size, center=(0, 0, z[0])))
+    elif rho.size == 1:
+        turn = 2 * np.pi * np.arange(4 * SECTORS) / (4 * SECTORS)
+        ring = np.stack([rho[0] * np.cos(turn), rho[0] * np.sin(turn), np.full_like(turn, z[0])], axis=1)
+        parts.append(pyvista.lines_from_points(ring, close=True).tube(radius=0.15 * size))
+    elif not rho.any():
+        parts.append(pyvista.lines_from_points(np.stack([0 * z, 0 * z, z], axis=1)).tube(radius=0.1 * size))
+    else:
+        revolution = Revolution.of(rho, sectors=4 * SECTORS)
+        parts.append(polydata(revolution, revolution.vectors(rho, z)))
+    if body.moment:
+        start = (0.0, 0.0, float(z.mean()) - 1.2 * body.moment * size)
+        look = {"tip_length": 0.3, "tip_radius": 0.12, "shaft_radius": 0.045}
+        parts.append(pyvista.Arrow(start=start, direction=(0, 0, body.moment), scale=2.4 * size, **look))
+    return parts
+
+
+def polydata(revolution: Revolution, points: Array) -> pyvista.PolyData:
+    """A surface with its triangles first."""
+    import pyvista
+
+    faces = [np.insert(cells, 0, cells.shape[1], axis=1).ravel() for cells in (revolution.triangles, revolution.quads)]
+    return pyvista.PolyData(points, faces=np.concatenate(faces))
+
+
+def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18) -> None:
+    """Look from the front and a little from above, so that the points fill the picture beside the colour scale."""
+    toward = np.array([0.3, -1.0, 0.45])
+    toward /= np.linalg.norm(toward)
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    right /= np.linalg.norm(right)
+    up = np.cross(toward, right)
+    x, y, depth = points @ right, points @ up, np.ptp(points @ toward) + 1.0
+    aspect = plotter.window_size[0] / plotter.window_size[1]
+    # height of the picture in units of the scene
+    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin)
+    centre = (x.min() + x.max()) / 2 * right + (y.min() + y.max()) / 2 * up + (points @ toward).mean() * toward
+    centre = centre + bar / 2 * aspect * height * right
+    plotter.enable_parallel_projection()
+    plotter.camera.focal_point, plotter.camera.up = tuple(centre), tuple(up)
+    plotter.camera.position = tuple(centre + 10 * depth * toward)
+    plotter.camera.parallel_scale = height / 2
+    plotter.renderer.ResetCameraClippingRange()
+
+
+def _one(shown: Branch | Equilibrium) -> Equilibrium:
+    if not isinstance(shown, Sequence):
+        return shown
+    if not len(shown):
+        raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
+    return shown[-1]

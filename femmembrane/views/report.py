@@ -1,0 +1,391 @@
+"""A run as one page that needs no network: what was asked, what came out, and how far it is to be trusted.
+
+The page has a section for what the run has, and none for what it was not asked for. It is read on a phone as on a screen, in light and
+dark, and is the same for the same run: figures carry no date.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from itertools import groupby, pairwise
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import Status
+from ..results.store import replace_file
+from ..results.table import estimated
+from . import plots
+from .html import MOST_ROWS, branch_rows, pairs, table, text
+from .stage import Box
+from .style import STYLE
+from .svg import dark, inline_svg, variable
+from .vtk import Array, smooth_profile
+from .zones import new_label
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..results.records import Branch, Equilibrium
+
+#: inches: text is of a readable size in a column of a screen and on a phone
+_WIDTH, _HEIGHT = 4.7, 3.9
+_CURVES = 6
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)))
+_COLORS = ("#0072b2", "#d55e00", "#222222", "#a01040")
+
+
+def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, Any] | None = None) -> None:
+    """Write the page of a branch.
+
+    Parameters
+    ----------
+    branch : Branch
+        Without equilibria, too: the page then says what was asked and why there are none.
+    path : path
+        HTML file to write.
+    facts : mapping, optional
+        Of the run, as in its ``run.json``: ``command``, ``versions``, ``platform``, ``processors``, ``written``.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be written.
+    """
+    page = report(branch, facts)
+    with replace_file(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def report(branch: Branch, facts: Mapping[str, Any] | None = None) -> str:
+    """The page as text; see :func:`write_report`."""
+    page = _Page(branch, facts or {})
+    sections = [(name, body) for name, body in page.sections() if body]
+    title = branch.scene.title or "Inflated membrane"
+    links = "".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name, _ in sections)
+    bodies = "\n".join(f'<section id="{_anchor(name)}">\n<h2>{escape(name)}</h2>\n{body}\n</section>' for name, body in sections)
+    night = "".join(f"{variable(color)}:{dark(color)};" for color in sorted(page.colors))
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8"/>
+<meta name="viewport" content="width=device-width, initial-scale=1"/>
+<meta name="color-scheme" content="light dark"/>
+<link rel="icon" href="data:,"/>
+<title>{escape(title)}</title>
+<style>
+{STYLE}
+@media (prefers-color-scheme: dark) {{ :root {{ {night} }} }}
+</style>
+</head>
+<body>
+<header>
+<h1>{escape(title)}</h1>
+{page.summary()}
+<nav>{links}</nav>
+</header>
+<main>
+{bodies}
+</main>
+</body>
+</html>
+"""
+
+
+def _anchor(name: str) -> str:
+    return name.lower().replace(" ", "-")
+
+
+@dataclass(eq=False)
+class _Page:
+    branch: Branch
+    facts: Mapping[str, Any]
+    colors: set[str] = field(default_factory=set)
+    figures: int = 0
+
+    def sections(self) -> Iterator[tuple[str, str]]:
+        """Name and content of every section; one without content is left out."""
+        if len(self.branch):
+            yield "Branch", self._branch()
+            yield "Shape", self._shape()
+            yield "Verdicts", self._verdicts()
+            yield "Zones", self._zones()
+            yield "Error estimates", self._errors()
+            yield "Equilibria", self._equilibria()
+        yield "Scene", self._scene()
+        yield "Timings", self._timings()
+        yield "Versions", self._versions()
+        yield "How to cite", f"<pre>{escape(self.branch.cite())}</pre>"
+
+    def summary(self) -> str:
+        """How it ended, and the ranges of the main quantities."""
+        branch = self.branch
+        good = branch.status is Status.CONVERGED
+        message = "" if good else f"<p>{escape(branch.message)}</p><p>What helps: {escape(branch.status.advice)}.</p>"
+        state = f'<p class="badge {"good" if good else "bad"}">{escape(str(branch.status))}</p>'
+        tiles = [("equilibria", str(len(branch)))]
+        if len(branch):
+            for name, column in (("volume V/R₀³", "volume"), ("pressure P", "pressure"), ("pole height η(0)/R₀", "center_height")):
+                values = branch.column(column)
+                tiles.append((name, f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
+            tiles.append(("largest residual", f"{branch.column('residual').max():.1e}".replace("-", "−")))  # noqa: RUF001
+        shown = "".join(f'<div class="tile"><b>{value}</b><span>{escape(name)}</span></div>' for name, value in tiles)
+        return f'{state}{message}<div class="tiles">{shown}</div>'
+
+    def _figure(self, figure: Figure, label: str, caption: str = "") -> str:
+        self.figures += 1
+        svg, colors = inline_svg(figure, label, f"f{self.figures}")
+        self.colors |= colors
+        about = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+        return f"<figure>\n{svg}{about}</figure>"
+
+    def _branch(self) -> str:
+        figures = []
+        for across, label in (("volume", "Pressure against volume"), ("center_height", "Pressure against pole height")):
+            figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
+            plots.draw_branch(axes, self.branch, across=across)
+            _legend_below(figure, axes)
+            figures.append(self._figure(figure, label))
+        return _beside(*figures) + self._special_points() + self._jumps()
+
+    def _special_points(self) -> str:
+        points = self.branch.special_points
+        if points is None:
+            return ""
+        if not points:
+            return "<p>Searched for special points: there are none.</p>"
+        names = {kind: name for kind, (_, name) in plots.MARKERS.items()}
+        rows = [
+            [
+                names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
+                p.volume,
+                p.pressure,
+                p.center_height,
+                float(f"{p.error:.1e}"),
+            ]
+            for p in points
+        ]
+        return table(["special point", "V", "P", "pole height", "relative error"], rows)
+
+    def _jumps(self) -> str:
+        rows = []
+        for jump in self.branch.jumps:
+            start = (jump.limit.volume, jump.limit.pressure) if jump.limit else (np.nan, np.nan)
+            rows.append([jump.index, *start, jump.landing.volume, jump.landing.pressure])
+        return table(["snap to step", "from V", "from P", "to V", "to P"], rows) if rows else ""
+
+    def _shape(self) -> str:
+        last, at = self.branch[-1], f"at step {len(self.branch) - 1}, the last"
+        stresses = ("mechanical_stress_1", "mechanical_stress_2", *_totals(self.branch))
+        meridians = self._figure(_profiles(self.branch), "Deformed meridians of some equilibria with the sources")
+        along = self._figure(_along(last, ("stretch_1", "stretch_2")), "Stretches", f"Stretches {at}")
+        along += self._figure(_along(last, stresses), "Stresses", f"Cauchy stresses over μ {at}")
+        return _beside(meridians, f"<div>{along}</div>")
+
+    def _verdicts(self) -> str:
+        classes = _classes(self.branch)
+        if not classes:
+            return ""
+        rows = []
+        for name, words, _ in classes:
+            for word, steps in _runs(words):
+                span = str(steps[0]) if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
+                rows.append([name, word, span, *(_span(self.branch.column(c)[steps]) for c in ("volume", "pressure"))])
+        figure = self._figure(_eigenvalues(self.branch), "Smallest eigenvalues along the branch")
+        listed = table(["against", "verdict", "steps", "V", "P"], rows)
+        return f"{_beside(figure, listed)}<h3>The last equilibrium</h3>{pairs((name, reason) for name, _, reason in classes)}"
+
+    def _zones(self) -> str:
+        if not self.branch.scene.analysis.wrinkling:
+            return ""
+        runs = [steps for _, steps in _runs([", ".join(e.zones().kinds) for e in self.branch])]
+        shown = [step for steps in runs for step in dict.fromkeys((steps[0], steps[-1]))][:MOST_ROWS]
+        rows = [[step, self.branch[step].volume, self.branch[step].zones().summary] for step in shown]
+        caption = "First and last step with the same kinds of zones, and their parts of the reference area"
+        return _beside(self._figure(_zones(self.branch), "Taut and wrinkled zones"), table(["step", "V", "zones"], rows, caption=caption))
+
+    def _errors(self) -> str:
+        held, names = estimated(self.branch.scene)
+        if not names:
+            return ""
+        found = {name: self.branch.column(f"error_{name}") for name in names}
+        figure = self._figure(_error_curves(self.branch, found), "Estimated relative errors along the branch")
+        note = f"Relative errors of the discretisation, at the same {held}, from the same load in a finer space"
+        rows = [[name, *_largest(errors)] for name, errors in found.items()]
+        return _beside(figure, table(["of", "median", "largest", "there", "without an estimate"], rows, caption=note))
+
+    def _equilibria(self) -> str:
+        header, rows = branch_rows(self.branch)
+        how = f"{len(rows)} of {len(self.branch)}, evenly spread" if len(rows) < len(self.branch) else f"all {len(rows)}"
+        return f"<details><summary>Table ({how})</summary>{table(header, rows)}</details>"
+
+    def _scene(self) -> str:
+        parts = []
+        for name, content in self.branch.scene.to_dict().items():
+            if name == "title":
+                continue
+            for number, part in enumerate(content if isinstance(content, list) else [content]):
+                many = isinstance(content, list) and len(content) > 1
+                parts.append(f"<div><h3>{escape(name)}{f' {number + 1}' if many else ''}</h3>{pairs(_shortened(part))}</div>")
+        used = f"<p>{escape(self.branch.mesh_used)}</p>" if self.branch.mesh_used else ""
+        return f'{used}<div class="scene columns">{"".join(parts)}</div>'
+
+    def _timings(self) -> str:
+        timings = self.branch.timings
+        total = sum(timings.values())
+        if not total:
+            return ""
+        rows = "".join(
+            f'<tr><td>{escape(stage.replace("_", " "))}</td><td class="number">{seconds:.3f} s</td>'
+            f'<td class="bar"><i style="width:{100 * seconds / total:.1f}%"></i></td></tr>'
+            for stage, seconds in timings.items()
+        )
+        each = f", {1000 * total / len(self.branch):.2f} ms an equilibrium" if len(self.branch) else ""
+        return f'<div class="scroll"><table><tbody>{rows}</tbody></table></div><p>Together {total:.3f} s{each}.</p>'
+
+    def _versions(self) -> str:
+        facts = self.facts
+        known = [(name, facts[name]) for name in ("command", "written", "platform", "processors") if facts.get(name) is not None]
+        versions = dict(facts.get("versions", {}))
+        return f'<div class="scene">{pairs([*known, *versions.items()])}</div>' if known or versions else ""
+
+
+def _beside(*parts: str) -> str:
+    """Beside each other where there is room, else below each other."""
+    return f'<div class="figures">{"".join(parts)}</div>'
+
+
+def _shortened(part: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The keys of a table; a long list by its ends."""
+    for name, value in part.items():
+        if isinstance(value, list) and len(value) > 12:
+            yield name, f"{text(value[:3])}, …, {text(value[-1])} ({len(value)} values)"
+        elif isinstance(value, Mapping):
+            yield name, ", ".join(f"{key} = {text(item)}" for key, item in value.items())
+        else:
+            yield name, value
+
+
+def _classes(branch: Branch) -> list[tuple[str, list[str], str]]:
+    """Name, verdicts along the branch and the last reason of every class of perturbations that the scene asks for."""
+    asked: list[tuple[str, str | None, int]] = [(f"axisymmetric, {c} held", c, 0) for c in branch.scene.analysis.stability]
+    asked += [(f"n = {n} waves around the axis", None, n) for n in branch.scene.analysis.azimuthal_modes]
+    found = []
+    for name, control, n in asked:
+        verdicts = [e.verdict(control, azimuthal=n) for e in branch]
+        found.append((name, [v.word for v in verdicts], verdicts[-1].reason))
+    return found
+
+
+def _runs(words: list[str]) -> Iterator[tuple[str, list[int]]]:
+    """Stretches of steps with the same word."""
+    for word, steps in groupby(range(len(words)), key=words.__getitem__):
+        yield word, list(steps)
+
+
+def _span(values: Array) -> str:
+    low, high = f"{values.min():.5g}", f"{values.max():.5g}"
+    return (low if low == high else f"{low} … {high}").replace("-", "−")  # noqa: RUF001
+
+
+def _legend_below(figure: Figure, axes: Any, columns: int = 1) -> None:
+    handles, labels = plots.legend_entries(axes)
+    if handles:
+        look: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 3.2, "ncols": columns}
+        figure.legend(handles, labels, loc="outside lower left", **look)
+
+
+def _profiles(branch: Branch) -> Figure:
+    from matplotlib import colormaps
+
+    shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, _CURVES).round().astype(int))]
+    box = Box.of([equilibrium.profile() for equilibrium in shown])
+    figure, axes = plots.new_figure((_WIDTH, 1.9 + _HEIGHT * min(0.85, (box.high - box.low) / (2 * box.radius))))  # round stays round
+    for equilibrium, color in zip(shown, colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2))), strict=False):
+        label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
+        plots.draw_profile(axes, equilibrium, plots.Style(label, "-", color))
+    plots.draw_surroundings(axes, shown)
+    _legend_below(figure, axes)
+    return figure
+
+
+def _totals(branch: Branch) -> tuple[str, ...]:
+    """The total stresses differ from the mechanical ones by what a field and the thickness add."""
+    return ("total_stress_1", "total_stress_2") if branch.scene.sources else ()
+
+
+def _along(equilibrium: Equilibrium, names: tuple[str, ...]) -> Figure:
+    """Quantities of the profile along the arc of the reference meridian."""
+    profile = smooth_profile(equilibrium, points=201)
+    figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
+    for name, dashes, color in zip(names, _DASHES, _COLORS, strict=False):
+        way = {"1": "along the meridian", "2": "around the axis"}[name[-1]]
+        kind = name[:-2].replace("_", " ")
+        axes.plot(profile["r"], profile[name], linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
+    axes.set_xlabel("reference radius R/R₀")
+    axes.grid(color="0.9", linewidth=0.6)
+    if profile[names[0]].min() < 0 or min(profile[name].min() for name in names) < 0:
+        axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+    _legend_below(figure, axes)
+    return figure
+
+
+def _eigenvalues(branch: Branch) -> Figure:
+    """Smallest eigenvalues along the branch, on a scale that is linear around zero."""
+    figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
+    analysis = branch.scene.analysis
+    names = [*((f"{c} held", f"lambda_{c}") for c in analysis.stability), *((f"n = {n}", f"lambda_n{n}") for n in analysis.azimuthal_modes)]
+    values = {label: branch.column(name) for label, name in names}
+    known = np.concatenate([v[np.isfinite(v)] for v in values.values()])
+    for k, (label, value) in enumerate(values.items()):
+        _draw_steps(axes, branch, value, k, f"λ, {label}")
+    axes.axhline(0, color="0.4", linewidth=0.8, zorder=0)
+    usual = float(np.median(np.abs(known))) if known.size else 0.0
+    if usual and np.abs(known).max() > 30 * usual:
+        axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
+    axes.set_ylabel("smallest eigenvalue λ")
+    axes.grid(color="0.9", linewidth=0.6)
+    _legend_below(figure, axes, columns=2)
+    return figure
+
+
+def _largest(errors: Array) -> list[Any]:
+    """Median and largest size of the errors that are known, the step of the largest, and how many are not known."""
+    known = np.flatnonzero(np.isfinite(errors))
+    if not known.size:
+        return [np.nan, np.nan, "", errors.size]
+    sizes = np.abs(errors[known])
+    middle, largest = (float(f"{size:.1e}") for size in (np.median(sizes), sizes.max()))
+    return [middle, largest, f"step {known[np.argmax(sizes)]}", errors.size - known.size]
+
+
+def _zones(branch: Branch) -> Figure:
+    figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
+    handles = plots.draw_zones(axes, branch)
+    figure.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
+    return figure
+
+
+def _error_curves(branch: Branch, errors: Mapping[str, Array]) -> Figure:
+    figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
+    for k, (name, value) in enumerate(errors.items()):
+        _draw_steps(axes, branch, np.where(np.abs(value) > 0, np.abs(value), np.nan), k, name)
+    axes.set_yscale("log")
+    axes.set_ylabel("estimated relative error")
+    axes.grid(color="0.9", linewidth=0.6)
+    _legend_below(figure, axes, columns=3)
+    return figure
+
+
+def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, label: str) -> None:
+    """A quantity against the step, with a gap where the membrane snaps."""
+    breaks = [0, *(jump.index for jump in branch.jumps), len(branch)]
+    look: dict[str, Any] = {"linestyle": _DASHES[kind % 4], "color": _COLORS[kind % 4], "linewidth": 1.8}
+    for first, last in pairwise(breaks):
+        steps = np.arange(first, last)
+        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, label), **look)
+    axes.set_xlabel("step")
+    axes.xaxis.get_major_locator().set_params(integer=True)

@@ -1,0 +1,216 @@
+"""A branch in space: a window with a slider over the steps, a picture, or a movie; and the same for a mode in motion."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..results.store import replace_file
+from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
+from .movie import Frame, check_movie, write_movie
+from .picture import Surface, aim, check_quantity, draw_key, draw_surface, draw_surroundings, new_plotter
+from .stage import Box, place_of
+
+if TYPE_CHECKING:
+    import pyvista
+
+    from ..results.records import Branch, Equilibrium
+
+#: of a window and a picture, and of a movie, whose frames take a quarter of a second each without a graphics card
+SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
+#: most frames of a movie of a branch, and frames of one period of a mode
+_MOST, _PERIOD = 90, 30
+_RATE = 12.0
+#: seconds for which the last step of a branch stays, and the picture of a window between two phases of a mode, in milliseconds
+_HOLD, _PAUSE = 1.5, 50
+
+
+def view(
+    shown: Branch | Equilibrium,
+    *,
+    color: str = "stretch_2",
+    step: int | None = None,
+    mode: int | None = None,
+    screenshot: str | PathLike[str] | None = None,
+    movie: str | PathLike[str] | None = None,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Show the membrane in space: in a window, or, where a file is asked for, in files and without a display.
+
+    Camera and colours are the same for all steps of a window or a movie.
+
+    Parameters
+    ----------
+    shown : Branch or Equilibrium
+    color : str
+        What the colour shows: a stretch or a stress of the profile (``stretch_1``, ``total_stress_2``, ...), or ``zone``.
+    step : int, optional
+        The equilibrium of a picture, and of a mode; in a window, the first that is shown. Default the last; negative ones count
+        from the end.
+    mode : int, optional
+        Show the lowest mode with so many waves around the axis in motion about that equilibrium, in place of the steps.
+    screenshot : path, optional
+        PNG file to write.
+    movie : path, optional
+        GIF or MP4 file to write: all steps (90 of them, where there are more), or one period of the mode.
+    size : tuple of int
+        Width and height in pixels; default (1200, 900), of a movie (720, 540).
+
+    Raises
+    ------
+    InputError
+        For an empty branch, an unknown colour, a step that is not there, a file that cannot be written, MP4 without a writer, and a
+        window without a display.
+    SolveError
+        For a mode of a state that has no natural modes.
+    """
+    branch = list(shown) if isinstance(shown, Sequence) else [shown]
+    if not branch:
+        raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
+    check_quantity(color, branch[0].scene, "color")
+    place = place_of(step, len(branch))
+    if movie is not None:
+        check_movie(movie)
+    if screenshot is None and movie is None:
+        _check_display()
+    if mode is not None:
+        _view_mode(branch[place], mode, screenshot, movie, size)
+        return
+    if screenshot is not None:
+        with replace_file(_png(screenshot)) as temporary, new_plotter(size or SIZE) as plotter:
+            _Stage(plotter, [branch[place]], [place], len(branch), color).draw(0)
+            plotter.screenshot(str(temporary))
+    if movie is not None:
+        chosen = np.unique(np.linspace(0, len(branch) - 1, min(len(branch), _MOST)).round().astype(int)).tolist()
+        with new_plotter(size or MOVIE_SIZE) as plotter:
+            stage = _Stage(plotter, [branch[k] for k in chosen], chosen, len(branch), color)
+            write_movie(_frames(stage), movie, rate=_RATE, hold=_HOLD)
+    if screenshot is None and movie is None:
+        with new_plotter(size or SIZE, off_screen=False) as plotter:
+            open_steps(plotter, branch, color, place)
+            plotter.show(title=branch[0].scene.title or "femmembrane")
+
+
+def open_steps(plotter: pyvista.Plotter, branch: Sequence[Equilibrium], color: str, place: int) -> None:
+    """Fill a window: the membrane at a step and, for more than one, the slider."""
+    stage = _Stage(plotter, branch, range(len(branch)), len(branch), color)
+    stage.draw(place)
+    if len(branch) > 1:
+        plotter.add_slider_widget(
+            lambda value: stage.draw(round(value)),
+            (0, len(branch) - 1),
+            value=place,
+            title="step",
+            fmt="%.0f",
+            pointa=(0.66, 0.07),
+            pointb=(0.96, 0.07),
+            color="black",
+            style="modern",
+            interaction_event="always",
+        )
+
+
+@dataclass(eq=False)
+class _Stage:
+    """The steps of a branch in one picture: camera, colours and sources do not change from one to the next."""
+
+    plotter: pyvista.Plotter
+    branch: Sequence[Equilibrium]
+    numbers: Sequence[int]
+    total: int
+    color: str
+
+    def __post_init__(self) -> None:
+        self.surfaces = [Surface.of(equilibrium, self.color, sectors=96) for equilibrium in self.branch]
+        self.limits = min(s.range[0] for s in self.surfaces), max(s.range[1] for s in self.surfaces)
+        box = Box.of([{"rho": s.rho, "eta": s.eta} for s in self.surfaces])
+        self.extent = box.size
+        drawn = draw_surroundings(self.plotter, self.branch[0].scene, box)
+        draw_key(self.plotter, self.surfaces[0], self.limits)
+        aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11)
+
+    def draw(self, index: int) -> None:
+        draw_surface(self.plotter, self.surfaces[index], self.limits, self.extent)
+        write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total))
+
+
+def _frames(stage: _Stage) -> Iterator[Frame]:
+    for index in range(len(stage.surfaces)):
+        stage.draw(index)
+        yield _frame(stage.plotter)
+
+
+def _frame(plotter: pyvista.Plotter) -> Frame:
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)[..., :3]
+
+
+def write_caption(plotter: pyvista.Plotter, text: str) -> None:
+    """Lines at the upper left, in place of those before."""
+    width, height = plotter.window_size
+    plotter.add_text(text, position=(0.03 * width, 0.9 * height), font_size=11 * height / 720, color="black", name="caption", render=False)
+
+
+def _caption(equilibrium: Equilibrium, number: int, total: int) -> str:
+    scene = equilibrium.scene
+    numbers = f"V = {equilibrium.volume:.4g}   P = {equilibrium.pressure:.4g}   pole height {equilibrium.center_height:.4g}"
+    verdicts = [f"{equilibrium.verdict(control).word} under {control} control" for control in scene.analysis.stability]
+    step = f"step {number}/{total - 1}   " if total > 1 else ""
+    return "\n".join(line for line in (step + numbers, ", ".join(verdicts)) if line)
+
+
+def _view_mode(
+    equilibrium: Equilibrium,
+    waves: int,
+    screenshot: str | PathLike[str] | None,
+    movie: str | PathLike[str] | None,
+    size: tuple[int, int] | None,
+) -> None:
+    found = equilibrium.frequencies(azimuthal=waves, count=1)[0]
+    if screenshot is not None:
+        render_mode(equilibrium, found, _png(screenshot), size=size or (1500, 700))
+    surface = ModeSurface(equilibrium, found, None, sectors=96)
+    if movie is not None:
+        with new_plotter(size or MOVIE_SIZE) as plotter:
+            write_movie(_phases(plotter, surface), movie, rate=2 * _RATE)
+    if screenshot is None and movie is None:
+        with new_plotter(size or SIZE, off_screen=False) as plotter:
+            set_in_motion(plotter, surface)
+            plotter.show(title=surface.caption)
+
+
+def set_in_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
+    """Fill a window with a mode that moves while it is open."""
+
+    def move(tick: int) -> None:
+        draw_moved(plotter, surface, float(np.cos(2 * np.pi * tick / _PERIOD)))
+        plotter.render()
+
+    set_up_motion(plotter, surface)
+    draw_moved(plotter, surface, 1.0)
+    plotter.add_timer_event(max_steps=10**6, duration=_PAUSE, callback=move)
+
+
+def _phases(plotter: pyvista.Plotter, surface: ModeSurface) -> Iterator[Frame]:
+    set_up_motion(plotter, surface)
+    for frame in range(_PERIOD):
+        draw_moved(plotter, surface, float(np.cos(2 * np.pi * frame / _PERIOD)))
+        yield _frame(plotter)
+
+
+def _png(path: str | PathLike[str]) -> str | PathLike[str]:
+    if not str(path).lower().endswith(".png"):
+        raise InputError("screenshot", str(path), "a name that ends in .png is allowed")
+    return path
+
+
+def _check_display() -> None:
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError("view", "a window", "there is no display; screenshot or movie (--screenshot, --movie) draw without one")

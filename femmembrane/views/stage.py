@@ -1,0 +1,125 @@
+"""What stands in a picture beside the membrane, before anything is drawn: bodies of sources, and where the membrane is held.
+
+Sources are asked for their :class:`~femmembrane.physics.outline.Outline`, the mesh for its supports; neither the kind of a source nor the
+shape of the membrane is known here, and pictures in the plane and in space show the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..physics.outline import Outline
+
+if TYPE_CHECKING:
+    from ..results.records import Equilibrium
+    from ..scene import Scene
+
+Array = NDArray[np.float64]
+
+#: a source further from the membrane than this many times its size would leave the membrane a speck in the picture
+FAR = 1.5
+#: how far a body without an end reaches beyond the membrane, in sizes of the membrane
+_BEYOND = 0.3
+
+
+@dataclass(frozen=True)
+class Box:
+    """The region of the half-plane that drawn membranes fill.
+
+    Attributes
+    ----------
+    radius, low, high : float
+        Largest radius, lowest and highest point, over R0.
+    """
+
+    radius: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, profiles: Sequence[dict[str, Array]]) -> Box:
+        """The smallest one around some profiles."""
+        rho, eta = (np.concatenate([profile[name] for profile in profiles]) for name in ("rho", "eta"))
+        return cls(float(rho.max()), float(eta.min()), float(eta.max()))
+
+    @property
+    def size(self) -> float:
+        """Its larger side, both halves of the membrane taken together."""
+        return max(2 * self.radius, self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The sources of a scene in a picture of membranes in a box.
+
+    Attributes
+    ----------
+    near : tuple of Outline
+        Drawn; ends at infinity are cut off.
+    absent : tuple of str
+        Names of those that are not: too far away, or of a kind that does not say how it looks.
+    """
+
+    near: tuple[Outline, ...]
+    absent: tuple[str, ...]
+
+
+def surroundings(scene: Scene, box: Box) -> Surroundings:
+    """Which sources of a scene are drawn beside membranes in a box."""
+    near, absent = [], []
+    for source in scene.sources:
+        outline = getattr(source, "outline", None)
+        if outline is None:
+            absent.append(type(source).__name__.lower())
+            continue
+        body = _cut(outline(), box)
+        if _distance(body, box) > FAR * box.size:
+            absent.append(body.label)
+        else:
+            near.append(body)
+    return Surroundings(tuple(near), tuple(absent))
+
+
+def clamped_ends(equilibrium: Equilibrium, nodes: int = 2) -> list[tuple[int, float, float]]:
+    """The ends of the meridian that are held in every direction, off the axis: place among so many nodes, radius, height."""
+    mesh = equilibrium.scene.mesh
+    profile = equilibrium.profile()
+    ends = zip((0, -1), mesh.supports(), strict=True)
+    return [
+        (end % nodes, float(profile["rho"][end]), float(profile["eta"][end]))
+        for end, held in ends
+        if {"u", "w"} <= held and profile["r"][end] > 0
+    ]
+
+
+def place_of(step: int | None, count: int) -> int:
+    """Place of a step among so many, negative ones counted from the end; without a step the last.
+
+    Raises
+    ------
+    InputError
+        For a step that is not there.
+    """
+    if step is None:
+        return count - 1
+    if isinstance(step, bool) or not isinstance(step, (int, np.integer)) or not -count <= step < count:
+        raise InputError("step", step, f"a whole number from {-count} to {count - 1} is allowed: negative ones count from the end")
+    return int(step) % count
+
+
+def _cut(body: Outline, box: Box) -> Outline:
+    low, high = box.low - _BEYOND * box.size, box.high + _BEYOND * box.size
+    ends = {-np.inf: low, np.inf: high}
+    return replace(body, points=tuple((float(rho), float(ends.get(z, z))) for rho, z in body.points))
+
+
+def _distance(body: Outline, box: Box) -> float:
+    """From the nearest corner of the body to the box."""
+    rho, z = np.array(body.points).T
+    return float(np.min(np.hypot(np.maximum(rho - box.radius, 0), np.maximum(np.maximum(box.low - z, z - box.high), 0))))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import sqlite3
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import active_children
 
@@ -317,12 +319,30 @@ def test_a_cluster_of_which_a_worker_is_killed(plain):
             if done == 1:
                 os.kill(pids[0], signal.SIGKILL)
 
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(fm, "__version__", "0.0.0")
+            with pytest.raises(InputError, match="its workers have femmembrane"):
+                fm.sweep(below(), wide(), direction=-1, scheduler=cluster.scheduler_address)
         found = fm.sweep(below(), wide(), direction=-1, scheduler=cluster.scheduler_address, on_scene=kill)
     assert seen == list(range(13))
     assert same(found, plain)
 
 
-def test_a_scheduler_that_is_not_there(monkeypatch):
+def test_a_script_without_a_guard_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    lines = [
+        "import femmembrane as fm",
+        "run = fm.Run(control='volume', values=(1.0,))",
+        "scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(elements=4), run=run)",
+        "fm.sweep(scene, {'mesh.degree': [1, 2]}, quantity='run', workers=2)",
+    ]
+    script.write_text("\n".join(lines))
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=120, check=False)
+    assert ended.returncode != 0
+    assert "no process could be started; a script must call this below if __name__" in ended.stderr
+
+
+def test_a_scheduler_that_is_not_there():
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match="address of a running Dask scheduler"):
         fm.sweep(below(), OVER, scheduler="nonsense://x")

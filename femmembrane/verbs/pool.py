@@ -13,7 +13,6 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
-from typing import Any
 
 from ..errors import InputError
 from ..scene import Scene
@@ -21,7 +20,7 @@ from .quantities import UNEXPECTED, Options, Row, compute
 
 #: key, scene, quantity, options
 Task = tuple[str, Scene, str, Options]
-#: seconds in which a first worker must have answered
+#: seconds in which a worker must have come
 _PATIENCE = 120.0
 
 
@@ -50,7 +49,7 @@ def on_cores(tasks: Iterator[Task], workers: int) -> Iterator[tuple[str, Row]]:
         under_way: dict[str, Task] = {}
         try:
             with _processes(workers) as executor:
-                _try_out(executor, "workers", workers)
+                _try_out(executor, workers)
                 yield from _drive(executor, tasks, under_way, lambda: workers + 2)
             return
         except BrokenProcessPool:
@@ -74,9 +73,18 @@ def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]
         client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError("scheduler", address, f"the address of a running Dask scheduler is allowed ({error})") from None
-    with client, client.get_executor(pure=False) as executor:
-        _try_out(executor, "scheduler", address)
-        yield from _drive(executor, tasks, {}, lambda: max(16, 4 * sum(client.nthreads().values())))
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE)
+            found = set(client.run(_version).values())
+        except TimeoutError:
+            raise InputError("scheduler", address, f"it has no worker, and none came in {_PATIENCE:g} s") from None
+        except ImportError as error:
+            raise InputError("scheduler", address, f"its workers need femmembrane {_version()} ({error})") from None
+        if found != {_version()}:
+            raise InputError("scheduler", address, f"its workers have femmembrane {', '.join(sorted(found))}; {_version()} is needed")
+        with client.get_executor(pure=False) as executor:
+            yield from _drive(executor, tasks, {}, lambda: max(16, 4 * sum(client.nthreads().values())))
 
 
 @contextmanager
@@ -93,27 +101,21 @@ def _processes(workers: int) -> Iterator[Executor]:
     executor.shutdown()
 
 
-def _try_out(executor: Executor, argument: str, value: Any) -> None:
-    """One trivial call, so that what is wrong with the workers is not taken for a fault of the scenes."""
-    from .. import __version__
-
+def _try_out(executor: Executor, workers: int) -> None:
+    """One trivial call, so that processes that cannot start are not taken for a fault of the scenes."""
     try:
-        version = executor.submit(_version).result(_PATIENCE)
+        executor.submit(os.getpid).result(_PATIENCE)
     except BrokenProcessPool:
-        advice = 'a script that is run must call it below if __name__ == "__main__":, for each process reads it; or workers=1'
-        raise InputError(argument, value, f"no process could be started; {advice}") from None
-    except TimeoutError:
-        raise InputError(argument, value, f"no worker answered in {_PATIENCE:g} s") from None
-    except ImportError as error:
-        raise InputError(argument, value, f"its workers need femmembrane {__version__} ({error})") from None
-    if version != __version__:
-        raise InputError(argument, value, f"its workers have femmembrane {version}, and {__version__} is needed")
+        advice = 'a script must call this below if __name__ == "__main__":, for each process reads it; or give workers=1'
+        raise InputError("workers", workers, f"no process could be started; {advice}") from None
 
 
 def _version() -> str:
+    """The version, and which of its halves computes: they agree to round-off, not to the last bit."""
     from .. import __version__
+    from ..native import native
 
-    return __version__
+    return f"{__version__} ({'compiled' if native() else 'in NumPy'})"
 
 
 def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task], room: Callable[[], int]) -> Iterator[tuple[str, Row]]:

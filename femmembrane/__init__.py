@@ -68,6 +68,9 @@ if TYPE_CHECKING:
     from .verbs.cost import cost as cost
     from .verbs.folds import Cusp as Cusp
     from .verbs.folds import FoldCurve as FoldCurve
+    from .verbs.sweep import Sweep as Sweep
+    from .verbs.sweep import plan_sweep as plan_sweep
+    from .verbs.sweep import sweep as sweep
     from .verbs.trace import trace as trace
     from .views.export import export as export
     from .views.modes import render_mode as render_mode
@@ -102,6 +105,7 @@ _ROOMS = {
     "stability.zones": ("Zone", "Zones"),
     "verbs.cost": ("Cost",),
     "verbs.folds": ("Cusp", "FoldCurve"),
+    "verbs.sweep": ("Sweep", "plan_sweep", "sweep"),
     "verbs": (
         *(
             "Equilibria",

@@ -35,7 +35,7 @@ KEPT_IN = {
 }
 #: only inside functions
 HEAVY = (
-    *("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "vtk", "vtkmodules"),
+    *("meshio", "pyvista", "matplotlib", "xarray", "pandas", "dask", "distributed", "vtk", "vtkmodules"),
     *("h5netcdf", "netCDF4", "rich", "tomli_w", "PIL", "imageio", "h5py"),
 )
 

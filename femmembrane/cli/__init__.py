@@ -14,7 +14,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import InputError
-from . import completion, convergence, cost, export, report, run, scenes, view
+from . import completion, convergence, cost, export, report, run, scenes, sweep, view
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
@@ -28,7 +28,17 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
-for command in (run.run, convergence.convergence, cost.cost, report.report, view.view, export.export, scenes.scenes, scenes.new):
+for command in (
+    run.run,
+    sweep.sweep,
+    convergence.convergence,
+    cost.cost,
+    report.report,
+    view.view,
+    export.export,
+    scenes.scenes,
+    scenes.new,
+):
     app.command(command)
 app.command(completion.install_completion, name="--install-completion")
 

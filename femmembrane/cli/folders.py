@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def read(path: Path) -> Scene:
+def read(path: Path, needs_run: bool = True) -> Scene:
     """The scene of a file, or one that comes with the package, by its name."""
     from ..scene import Scene
 
     if not path.suffix and not path.exists():
         path = _bundled(str(path))
     scene = Scene.from_toml(path)
-    if scene.run is None:
+    if needs_run and scene.run is None:
         raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
     return scene
 

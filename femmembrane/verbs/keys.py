@@ -1,0 +1,85 @@
+"""A scene with some of its keys changed, by their places in a scene file."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+
+
+def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """The tables of a scene with one value changed or added; what was given stays as it is.
+
+    Parameters
+    ----------
+    tables : mapping
+        As in a scene file (:meth:`Scene.to_dict`).
+    key : str
+        Tables, places in lists (from 0) and names, joined by dots: ``mesh.elements``, ``source.0.strength``, ``run.until.center_height``.
+    value : object
+        Not checked here, and nor is the last name: ``Scene.from_dict`` does both.
+
+    Raises
+    ------
+    InputError
+        For a key that leads nowhere.
+    """
+    if not isinstance(key, str) or not all(key.split(".")):
+        raise InputError("key", key, "the place of a value in a scene file is allowed, such as mesh.elements or source.0.strength")
+    changed = copy.deepcopy(dict(tables))
+    place: Any = changed
+    *path, last = key.split(".")
+    for depth, name in enumerate(path):
+        place = place.setdefault(name, {}) if isinstance(place, dict) else place[_index(place, key, depth)]
+    if isinstance(place, dict):
+        place[last] = value
+    else:
+        place[_index(place, key, len(path))] = value
+    return changed
+
+
+def values_of(option: str, text: str) -> tuple[str, tuple[Any, ...]]:
+    """A key and its values from KEY=START:STOP:COUNT or KEY=V1,V2,...; what is no TOML value is a text.
+
+    Raises
+    ------
+    InputError
+        Naming the option, for anything else.
+    """
+    key, equals, values = text.partition("=")
+    allowed = "KEY=START:STOP:COUNT or KEY=V1,V2,... is allowed, such as source.0.strength=50:1000:40 or mesh.elements=16,32,64"
+    if not (key and equals and values):
+        raise InputError(option, text, allowed)
+    if ":" not in values:
+        return key, tuple(_value(word.strip()) for word in values.split(","))
+    try:
+        start, stop, count = values.split(":")
+        ends, number = (float(start), float(stop)), int(count)
+    except ValueError:
+        raise InputError(option, text, allowed) from None
+    if not np.isfinite(ends).all() or number < 1 or (number > 1) == (ends[0] == ends[1]):
+        raise InputError(option, text, "START:STOP:COUNT takes two different finite numbers and a whole number >= 2")
+    return key, tuple(np.linspace(*ends, number).tolist())
+
+
+def _value(word: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {word}")["value"]
+    except tomllib.TOMLDecodeError:
+        return word
+
+
+def _index(place: Any, key: str, depth: int) -> int:
+    """The place in a list that a part of a key means."""
+    names = key.split(".")
+    owner, name = ".".join(names[:depth]) or "the scene", names[depth]
+    if not isinstance(place, list):
+        raise InputError("key", key, f"{owner} has no keys below it; keys such as mesh.elements and source.0.strength are allowed")
+    if not name.isdigit() or int(name) >= len(place):
+        raise InputError("key", key, f"{owner} is a list with the places 0 to {len(place) - 1}: {owner}.0 is the first")
+    return int(name)

@@ -1,0 +1,158 @@
+"""Many scenes at once: in this process, on this machine's cores, or on a Dask cluster.
+
+Each way takes the tasks one by one as there is room for them, and yields their rows as they are done, in any order. Processes compute a
+scene alone and know nothing of the others, so that rows do not depend on who computed them, or when.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context
+
+from ..errors import InputError
+from ..scene import Scene
+from .quantities import UNEXPECTED, Options, Row, compute
+
+#: key, scene, quantity, options
+Task = tuple[str, Scene, str, Options]
+#: seconds in which a worker must have come
+_PATIENCE = 120.0
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def here(tasks: Iterator[Task]) -> Iterator[tuple[str, Row]]:
+    """One after the other, in this process."""
+    for key, scene, quantity, options in tasks:
+        yield key, compute(scene, quantity, options)
+
+
+def on_cores(tasks: Iterator[Task], workers: int) -> Iterator[tuple[str, Row]]:
+    """In processes of this machine.
+
+    When one dies, the scenes that were under way are tried again one by one: one whose process dies again has a row that says so.
+
+    Raises
+    ------
+    InputError
+        When processes cannot be started.
+    """
+    while True:
+        under_way: dict[str, Task] = {}
+        try:
+            with _processes(workers) as executor:
+                _try_out(executor, workers)
+                yield from _drive(executor, tasks, under_way, lambda: workers + 2)
+            return
+        except BrokenProcessPool:
+            pass
+        yield from _one_by_one(list(under_way.values()))
+
+
+def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]:
+    """On the workers of a Dask cluster, whose scheduler sees to it that scenes of lost workers are computed by others.
+
+    Raises
+    ------
+    InputError
+        Without the package distributed, when no scheduler answers at the address, or when its workers lack this package.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("scheduler", address, 'it needs the package distributed: pip install "femmembrane[dask]"') from None
+    try:
+        client = Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError("scheduler", address, f"the address of a running Dask scheduler is allowed ({error})") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE)
+            found = set(client.run(_version).values())
+        except TimeoutError:
+            raise InputError("scheduler", address, f"it has no worker, and none came in {_PATIENCE:g} s") from None
+        except ImportError as error:
+            raise InputError("scheduler", address, f"its workers need femmembrane {_version()} ({error})") from None
+        if found != {_version()}:
+            raise InputError("scheduler", address, f"its workers have femmembrane {', '.join(sorted(found))}; {_version()} is needed")
+        with client.get_executor(pure=False) as executor:
+            yield from _drive(executor, tasks, {}, lambda: max(16, 4 * sum(client.nthreads().values())))
+
+
+@contextmanager
+def _processes(workers: int) -> Iterator[Executor]:
+    # spawned, not forked: a fork copies locks that threads of the numerical libraries may hold
+    executor = ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
+    )
+    try:
+        yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
+    executor.shutdown()
+
+
+def _try_out(executor: Executor, workers: int) -> None:
+    """One trivial call, so that processes that cannot start are not taken for a fault of the scenes."""
+    try:
+        executor.submit(os.getpid).result(_PATIENCE)
+    except BrokenProcessPool:
+        advice = 'a script must call this below if __name__ == "__main__":, for each process reads it; or give workers=1'
+        raise InputError("workers", workers, f"no process could be started; {advice}") from None
+
+
+def _version() -> str:
+    """The version, and which of its halves computes: they agree to round-off, not to the last bit."""
+    from .. import __version__
+    from ..native import native
+
+    return f"{__version__} ({'compiled' if native() else 'in NumPy'})"
+
+
+def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task], room: Callable[[], int]) -> Iterator[tuple[str, Row]]:
+    """Keep an executor busy with no more tasks than there is room for; ``under_way`` holds what has not come back."""
+    futures: dict[Future[Row], str] = {}
+    for task in tasks:
+        key, scene, quantity, options = task
+        under_way[key] = task
+        futures[executor.submit(compute, scene, quantity, options)] = key
+        if len(futures) >= room():
+            yield from _finished(futures, under_way)
+    while futures:
+        yield from _finished(futures, under_way)
+
+
+def _finished(futures: dict[Future[Row], str], under_way: dict[str, Task]) -> Iterator[tuple[str, Row]]:
+    for future in wait(futures, return_when=FIRST_COMPLETED).done:
+        try:
+            row = future.result()
+        except BrokenProcessPool:
+            raise
+        except Exception as error:  # a cluster gives up on a scene that workers died of
+            row = Row(UNEXPECTED, f"{type(error).__name__}: {error}", {})
+        key = futures.pop(future)
+        under_way.pop(key)
+        yield key, row
+
+
+def _one_by_one(left: list[Task]) -> Iterator[tuple[str, Row]]:
+    """Suspects: in one process, and in another one whenever that dies."""
+    while left:
+        try:
+            with _processes(1) as executor:
+                while left:
+                    key, scene, quantity, options = left[0]
+                    row = executor.submit(compute, scene, quantity, options).result()
+                    left.pop(0)
+                    yield key, row
+        except BrokenProcessPool:
+            yield left.pop(0)[0], Row(UNEXPECTED, "the process that computed it died (out of memory, or killed)", {})

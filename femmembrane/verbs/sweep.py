@@ -1,0 +1,360 @@
+"""One question asked of a grid of scenes."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..results.grid import dataset_of, load_dataset, save_dataset
+from ..results.kept import Kept
+from ..results.store import scene_text
+from ..scene import Scene
+from . import pool
+from .keys import set_key
+from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
+
+if TYPE_CHECKING:
+    import xarray
+
+#: called with the number of scenes that are done, all there are, and those of the done ones without a result
+OnScene = Callable[[int, int, int], None]
+#: where finished scenes are kept in the folder of a sweep
+KEPT = "scenes.sqlite"
+#: scenes that are timed for an estimate
+_SAMPLE = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What came of every scene of a grid.
+
+    Attributes
+    ----------
+    scene : Scene
+        The one whose keys were changed.
+    over : mapping of str to tuple
+        The values of each key.
+    quantity : str
+    """
+
+    scene: Scene
+    over: Mapping[str, tuple[Any, ...]]
+    quantity: str
+    _dataset: xarray.Dataset = field(repr=False)
+
+    def __len__(self) -> int:
+        return math.prod(len(values) for values in self.over.values())
+
+    def __str__(self) -> str:
+        keys = ", ".join(f"{key} ({len(values)} values)" for key, values in self.over.items())
+        statuses, counts = np.unique(self._dataset["status"].values, return_counts=True)
+        lines = [f"{len(self)} scenes over {keys}: {self.quantity}"]
+        return "\n".join(lines + [f"{count:>8} {status}" for status, count in zip(statuses, counts, strict=True)])
+
+    @property
+    def failed(self) -> int:
+        """Number of scenes without a result; the reasons are in ``status`` and ``message``."""
+        return int((~self._dataset["has_result"].values).sum())
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Everything as one data set, whose dimensions are the keys; ``status`` and ``message`` say how each scene ended."""
+        return self._dataset.copy()
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the data set to a NetCDF file, whole or not at all."""
+        save_dataset(self._dataset, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Sweep:
+        """Bring a saved sweep back.
+
+        Raises
+        ------
+        InputError
+            When the file is no sweep.
+        """
+        from ..results.store import scene_from_text
+
+        dataset = load_dataset(path)
+        over = {key: tuple(dataset[key].values.tolist()) for key in json.loads(dataset.attrs["over"])}
+        return cls(scene_from_text(dataset.attrs["scene"]), over, dataset.attrs["quantity"], dataset)
+
+    def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None) -> Any:
+        """Maps over two keys, or curves over one, as a Matplotlib figure, also written to ``path`` if given.
+
+        Parameters
+        ----------
+        show : sequence of str, optional
+            Variables of the data set; one with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
+            most telling ones of the quantity.
+
+        Raises
+        ------
+        InputError
+            For an unknown variable, for three keys or more, or a file that cannot be written.
+        """
+        from ..views.grid import plot_grid
+
+        return plot_grid(self, path, show)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How long a sweep will take.
+
+    Attributes
+    ----------
+    scenes, kept : int
+        Different scenes of the grid, and those of them that are finished already.
+    seconds_each : float
+        Mean wall time of the scenes that were timed; 0 if none is left.
+    timed, workers : int
+        How many were timed, and how many processes share the work.
+    """
+
+    scenes: int
+    kept: int
+    seconds_each: float
+    timed: int
+    workers: int
+
+    @property
+    def seconds(self) -> float:
+        """Expected wall time of what is left."""
+        return (self.scenes - self.kept) * self.seconds_each / self.workers
+
+    def __str__(self) -> str:
+        left = self.scenes - self.kept
+        text = f"{self.scenes} scenes, {self.kept} of them finished"
+        if not left:
+            return f"{text}: nothing to compute"
+        each = f"{1e3 * self.seconds_each:.3g} ms a scene (mean of {self.timed})"
+        return f"{text}; {each}: about {self.seconds:.3g} s for the other {left} on {self.workers} process(es)"
+
+
+def sweep(
+    scene: Scene,
+    over: Mapping[str, Iterable[Any]],
+    *,
+    quantity: str = "branch",
+    pressure: float | None = None,
+    volume: float | None = None,
+    direction: int = 1,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: str | PathLike[str] | None = None,
+    on_scene: OnScene | None = None,
+) -> Sweep:
+    """Compute one quantity of every scene of a grid.
+
+    All scenes are checked before the first is computed. Each is computed on its own, from a cold start, so that its row is the same to the
+    last bit whoever computes it; a scene that fails is a row with its reason.
+
+    Parameters
+    ----------
+    scene : Scene
+    over : mapping of str to values
+        Keys as in a scene file, such as ``source.0.strength`` or ``mesh.elements``, and the values each takes: numbers, booleans or texts.
+    quantity : {"branch", "run", "equilibria", "tipping", "wrinkling"}
+        A branch by arc length with its special points; what [run] says; all equilibria at a pressure or volume; where along the branch
+        stability against one wave around the axis is first lost or regained; where its stresses (``analysis.wrinkling``, or the
+        mechanical ones) first become compressive. All but equilibria follow the scene's [run].
+    pressure, volume : float, optional
+        For equilibria: exactly one of them.
+    direction : {1, -1}
+        For branch, tipping and wrinkling: whether to set out to larger or smaller volumes.
+    workers : int, optional
+        Processes on this machine; default one a core, 1 stays in this process. With more than one, a script must call this below
+        ``if __name__ == "__main__":``.
+    scheduler : str, optional
+        Address of a running Dask scheduler (``tcp://...``) whose workers compute, in place of this machine.
+    out : path, optional
+        Folder in which finished scenes are kept: they are not computed again, by this sweep or another one, so that an interrupted sweep
+        goes on where it was.
+    on_scene : callable, optional
+        Called with (done, all, failed) after each scene.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    InputError
+        For a key that the scenes do not have, for a value that one of them refuses, and for what cannot be used of the rest.
+    """
+    grid = _Grid.of(scene, over, quantity, Options(pressure, volume, direction))
+    workers = _workers(workers, scheduler)
+    with ExitStack() as stack:
+        kept = None if out is None else stack.enter_context(Kept(Path(out) / KEPT))
+        rows = _known(grid, kept)
+        failed = sum(not row.values for row in rows.values())
+        if on_scene is not None:
+            on_scene(len(rows), len(grid.distinct), failed)
+        tasks = grid.tasks(set(rows))
+        missing = len(grid.distinct) - len(rows)
+        for key, row in _computed(tasks, min(workers, missing), scheduler if missing else None):
+            rows[key] = row
+            failed += not row.values
+            _keep(kept, key, row)
+            if on_scene is not None:
+                on_scene(len(rows), len(grid.distinct), failed)
+    facts = {
+        "quantity": quantity,
+        "scene": scene_text(scene),
+        "over": json.dumps(list(grid.over)),
+        "options": json.dumps(asdict(grid.options)),
+    }
+    return Sweep(scene, grid.over, quantity, dataset_of(grid.over, [rows[key] for key in grid.keys], facts))
+
+
+def plan_sweep(
+    scene: Scene,
+    over: Mapping[str, Iterable[Any]],
+    *,
+    quantity: str = "branch",
+    pressure: float | None = None,
+    volume: float | None = None,
+    direction: int = 1,
+    workers: int | None = None,
+    out: str | PathLike[str] | None = None,
+) -> Plan:
+    """Count the scenes of a :func:`sweep` and time a few of them, spread over the grid, in this process.
+
+    Raises
+    ------
+    InputError
+        As :func:`sweep`.
+    """
+    grid = _Grid.of(scene, over, quantity, Options(pressure, volume, direction))
+    with ExitStack() as stack:
+        kept = stack.enter_context(Kept(Path(out) / KEPT)) if out is not None and (Path(out) / KEPT).exists() else None
+        known = set(_known(grid, kept))
+        left = [key for key in grid.distinct if key not in known]
+        # in the middle of equal parts: corners are where a grid is at its strangest
+        chosen = {left[(2 * k + 1) * len(left) // (2 * _SAMPLE)] for k in range(_SAMPLE)} if left else set()
+        seconds = 0.0
+        for key, changed, _, options in grid.tasks(set(grid.distinct) - chosen):
+            row = compute(changed, quantity, options)
+            seconds += row.seconds
+            _keep(kept, key, row)
+    return Plan(len(grid.distinct), len(known), seconds / max(len(chosen), 1), len(chosen), _workers(workers, None))
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """All scenes of a sweep, by their keys alone: a scene is made when its turn comes."""
+
+    tables: Mapping[str, Any]
+    over: Mapping[str, tuple[Any, ...]]
+    quantity: str
+    options: Options
+    keys: tuple[str, ...]
+    distinct: Mapping[str, int]
+
+    @classmethod
+    def of(cls, scene: Scene, over: Mapping[str, Iterable[Any]], quantity: str, options: Options) -> _Grid:
+        if not isinstance(scene, Scene):
+            raise InputError("scene", scene, "a Scene is allowed")
+        tables, values = scene.to_dict(), _checked(over)
+        if quantity not in QUANTITIES or not values:  # the rest is asked of each scene below
+            check(scene, quantity, options)
+        keys = []
+        for changed in _scenes(tables, values):
+            check(changed, quantity, options)
+            keys.append(_key(changed, quantity, options))
+        first = {key: place for place, key in reversed(list(enumerate(keys)))}
+        return cls(tables, values, quantity, options, tuple(keys), dict(sorted(first.items(), key=lambda item: item[1])))
+
+    def tasks(self, known: set[str]) -> Iterator[pool.Task]:
+        """What is to be computed, each scene once."""
+        for place, (key, scene) in enumerate(zip(self.keys, _scenes(self.tables, self.over), strict=True)):
+            if key not in known and self.distinct[key] == place:
+                yield key, scene, self.quantity, self.options
+
+
+def _scenes(tables: Mapping[str, Any], over: Mapping[str, tuple[Any, ...]]) -> Iterator[Scene]:
+    """The scenes of a grid, the last key fastest."""
+    for values in itertools.product(*over.values()):
+        changed: Mapping[str, Any] = tables
+        for key, value in zip(over, values, strict=True):
+            changed = set_key(changed, key, value)
+        yield Scene.from_dict(changed)
+
+
+def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
+    if not isinstance(over, Mapping) or not over:
+        raise InputError("over", over, 'a mapping of keys to values is allowed, such as {"source.0.strength": [100, 200, 400]}')
+    checked = {}
+    for key, values in over.items():
+        allowed = "one or more different numbers, booleans or texts of one kind are allowed"
+        if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
+            raise InputError(f"over[{key!r}]", values, allowed)
+        plain = tuple(v.item() if isinstance(v, np.generic) else v for v in values)
+        kinds = {float if type(v) is int else type(v) for v in plain}
+        if len(kinds) != 1 or not kinds <= {float, bool, str} or len(set(plain)) < len(plain):
+            raise InputError(f"over[{key!r}]", list(plain), allowed)
+        checked[key] = plain
+    return checked
+
+
+def _key(scene: Scene, quantity: str, options: Options) -> str:
+    """The hash of all that a row depends on; a title is not part of it."""
+    from .. import __version__
+
+    tables = {name: table for name, table in scene.to_dict().items() if name != "title"}
+    text = json.dumps([_canonical(tables), quantity, _canonical(asdict(options)), __version__], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _canonical(value: Any) -> Any:
+    """The same text for the same numbers: 200 is 200.0."""
+    if isinstance(value, dict):
+        return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_canonical(item) for item in value]
+    return float(value) if isinstance(value, (int, np.number)) and not isinstance(value, bool) else value
+
+
+def _workers(workers: Any, scheduler: Any) -> int:
+    if scheduler is not None and not isinstance(scheduler, str):
+        raise InputError("scheduler", scheduler, "the address of a Dask scheduler is allowed, such as tcp://host:8786")
+    if workers is None:
+        return pool.cores()
+    if scheduler is not None:
+        raise InputError("workers", workers, "not together with scheduler: a cluster has its own")
+    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1:
+        raise InputError("workers", workers, "a whole number >= 1 is allowed")
+    return int(workers)
+
+
+def _computed(tasks: Iterator[pool.Task], workers: int, scheduler: str | None) -> Iterator[tuple[str, Row]]:
+    if scheduler is not None:
+        return pool.on_cluster(tasks, scheduler)
+    return pool.on_cores(tasks, workers) if workers > 1 else pool.here(tasks)
+
+
+def _known(grid: _Grid, kept: Kept | None) -> dict[str, Row]:
+    found = {} if kept is None else {key: kept.get(key) for key in grid.distinct}
+    return {key: _compact(Row(**row)) for key, row in found.items() if row is not None}
+
+
+def _keep(kept: Kept | None, key: str, row: Row) -> None:
+    if kept is not None and row.status != UNEXPECTED:  # which may well go better another time
+        kept.put(key, asdict(row))
+
+
+def _compact(row: Row) -> Row:
+    """Lists as arrays: a quarter of the memory."""
+    return Row(row.status, row.message, {k: np.array(v, float) if isinstance(v, list) else v for k, v in row.values.items()}, row.seconds)

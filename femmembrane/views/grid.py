@@ -1,0 +1,236 @@
+"""Maps of a sweep over two keys and curves of one over one key.
+
+What has no value, and what ended early, is hatched and named: shades and hatches read the same in grey and to the colour-blind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, Status, unknown_name
+from ..results.grid import MEANING
+from .plots import HEIGHT_LABEL, PRESSURE_LABEL, VOLUME_LABEL, new_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..verbs.sweep import Sweep
+
+Array = NDArray[Any]
+
+#: what is shown of each quantity unless something else is asked for, as far as the sweep has it
+SHOWN = {
+    "branch": ("limit_points", "limit_pressure.0", "limit_pressure.1", "largest_wrinkled_fraction"),
+    "run": ("steps", "limit_points", "limit_pressure.0", "largest_wrinkled_fraction"),
+    "equilibria": ("equilibria", "stable_equilibria"),
+    "tipping": ("onset_center_height", "onset_pressure"),
+    "wrinkling": ("onset_center_height", "onset_pressure"),
+}
+_KEYS = {
+    "strength": "dipole strength M = μ₀D²/(R₀⁶μ)",
+    "height": "dipole height h/R₀",
+    "membrane.susceptibility": "susceptibility χ",
+    "run.start": "first load",
+    "run.stop": "last load",
+}
+_PLACES = {"volume": VOLUME_LABEL, "pressure": PRESSURE_LABEL, "center_height": HEIGHT_LABEL}
+_LABELS = {
+    "limit_points": "number of limit points",
+    "equilibria": "number of equilibria",
+    "stable_equilibria": "number of stable equilibria",
+    "largest_wrinkled_fraction": "largest wrinkled part of the area",
+}
+_HATCHES = ("////", "\\\\\\\\", "xxxx", "....", "----", "||||", "++++", "oooo")
+_MARKERS = "osv^D<>p"
+#: values that count something, in as many shades
+_COUNTS = ("limit_points", "volume_folds", "equilibria", "stable_equilibria", "azimuthal_onsets")
+#: more different counts than this share shades
+_SHADES = 9
+
+
+def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None) -> Figure:
+    """One panel for each variable: a map over two keys, or a curve over one.
+
+    Raises
+    ------
+    InputError
+        For an unknown variable, three keys or more, or a file that cannot be written.
+    """
+    dims = tuple(sweep.over)
+    if len(dims) > 2:
+        allowed = "maps have two keys, curves one; choose values of the others by to_xarray().sel(...) for a plot of your own"
+        raise InputError("over", list(dims), allowed)
+    data = sweep.to_xarray()
+    names = list(_available(data, SHOWN[sweep.quantity]) if show is None else show)
+    panels = [(name, _values(data, name, dims)) for name in names]
+    if not panels:
+        raise InputError("sweep", sweep.quantity, "no scene has a result to show; status and message say why")
+    draw = _draw_map if len(dims) == 2 else _draw_curve
+    figure, row = new_figure((5.2 * len(panels) + 0.4, 4.9), widths=[1.0] * len(panels))
+    handles: dict[str, Any] = {}
+    hatches: dict[str, str] = {}
+    for axes, (name, values) in zip(np.atleast_1d(row), panels, strict=True):
+        handles |= draw(axes, data, dims, name, values, hatches)
+    if handles:
+        figure.legend(
+            list(handles.values()), list(handles), loc="outside lower center", frameon=False, fontsize=8.5, ncols=min(3, len(handles))
+        )
+    figure.suptitle(sweep.scene.title.replace("$", r"\$"), fontsize=11)
+    return save_figure(figure, path)
+
+
+def _available(data: Any, names: Sequence[str]) -> Iterator[str]:
+    for name in names:
+        variable, _, place = name.partition(".")
+        if variable in data and (not place or int(place) < data[variable].shape[-1]):
+            yield name
+
+
+def _values(data: Any, name: str, dims: tuple[str, ...]) -> Array:
+    """The numbers of a panel, shape of the grid."""
+    known = [str(v) for v in data.data_vars if data[v].dtype.kind == "f" and v in MEANING]
+    variable, _, place = str(name).partition(".")
+    if variable not in known:
+        raise unknown_name("show", name, known)
+    array = data[variable]
+    if array.ndim == len(dims):
+        if place:
+            raise InputError("show", name, f"{variable} has one value a scene: give no place")
+        return array.values
+    if not place.isdigit() or int(place) >= array.shape[-1]:
+        raise InputError(
+            "show", name, f"{variable} with a place from 0 is allowed, such as {variable}.0: scenes have up to {array.shape[-1]}"
+        )
+    return array.values[..., int(place)]
+
+
+def _label(name: str) -> str:
+    """What a panel shows, with its unit."""
+    variable, _, place = name.partition(".")
+    if variable in _LABELS:
+        return _LABELS[variable]
+    tag, _, quantity = ("", "", variable) if variable in _PLACES else variable.partition("_")
+    if quantity not in _PLACES:
+        return MEANING[variable][1]
+    what = {"": "step", "limit": "limit point", "fold": "volume fold", "onset": "onset", "state": "equilibrium"}[tag]
+    return f"{what}{f' {int(place) + 1}' if place else ''}: {_PLACES[quantity]}"
+
+
+def _key_label(key: str) -> str:
+    return _KEYS.get(key) or (_KEYS.get(key.rpartition(".")[2]) if key.startswith("source.") else None) or key
+
+
+def _reasons(data: Any, values: Array) -> Array:
+    """Why a scene is not plainly a value: its status, or that there is nothing of the kind; empty for the rest."""
+    status = np.asarray(data["status"].values, dtype=object)
+    outcome = np.asarray(data["outcome"].values, dtype=object) if "outcome" in data else np.full(status.shape, "none there", dtype=object)
+    good = str(Status.CONVERGED)
+    reasons = np.full(status.shape, "", dtype=object)
+    missing = ~np.isfinite(values)
+    reasons[missing] = np.where(status[missing] == good, outcome[missing], status[missing])
+    early = ~missing & (status != good)
+    reasons[early] = np.array([f"{s}: the branch ends early" for s in status[early]], dtype=object)
+    return reasons
+
+
+def _positions(data: Any, key: str) -> tuple[Array, bool]:
+    """Where the values of a key are on an axis, and whether they are numbers."""
+    values = data[key].values
+    numbers = values.dtype.kind in "if"
+    return (values.astype(float) if numbers else np.arange(len(values), dtype=float)), numbers
+
+
+def _edges(centers: Array) -> Array:
+    """Ends of the cells around sorted values."""
+    if len(centers) == 1:
+        return centers[0] + np.array([-0.5, 0.5])
+    middle = (centers[1:] + centers[:-1]) / 2
+    return np.concatenate([[2 * centers[0] - middle[0]], middle, [2 * centers[-1] - middle[-1]]])
+
+
+def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: Array, hatches: dict[str, str]) -> dict[str, Any]:
+    x, y = (_positions(data, key)[0] for key in dims)
+    along, up = np.argsort(x), np.argsort(y)
+    x_edges, y_edges = _edges(x[along]), _edges(y[up])
+    grid = values[np.ix_(along, up)].T
+    reasons = _reasons(data, values)[np.ix_(along, up)].T
+    axes.set_facecolor("white")
+    if np.isfinite(grid).any():
+        _shade(axes, name, x_edges, y_edges, grid, grid[np.isfinite(grid) & (reasons == "")])
+    axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]), xlabel=_key_label(dims[0]), ylabel=_key_label(dims[1]))
+    for key, positions, axis in ((dims[0], x, axes.xaxis), (dims[1], y, axes.yaxis)):
+        if not _positions(data, key)[1]:
+            axis.set_ticks(positions, [str(v) for v in data[key].values])
+    axes.set_title(_label(name), fontsize=10)
+    return _hatch(axes, x_edges, y_edges, reasons, grid, hatches)
+
+
+def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array, plain: Array) -> None:
+    """Shades that span the plain values: those of a branch that ended early, perhaps far away, have the shade of the end they pass."""
+    from matplotlib import colormaps
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    masked = np.ma.masked_invalid(grid)
+    counts = np.unique(grid[np.isfinite(grid)])
+    if name in _COUNTS and len(counts) <= _SHADES:
+        low, high = int(counts[0]), int(counts[-1])
+        levels = np.arange(low, high + 1)
+        shades = ListedColormap(colormaps["cividis"](np.linspace(0.05, 1.0, len(levels))))
+        mesh = axes.pcolormesh(x_edges, y_edges, masked, cmap=shades, norm=BoundaryNorm(np.append(levels, high + 1) - 0.5, len(levels)))
+        axes.figure.colorbar(mesh, ax=axes, ticks=levels).ax.minorticks_off()
+    else:
+        known = plain if plain.size else masked.compressed()
+        low, high = known.min(), known.max()
+        extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+        ends = extend[bool(masked.min() < low), bool(masked.max() > high)]
+        axes.figure.colorbar(axes.pcolormesh(x_edges, y_edges, masked, cmap="cividis", vmin=low, vmax=high), ax=axes, extend=ends)
+
+
+def _hatch(axes: Axes, x_edges: Array, y_edges: Array, reasons: Array, grid: Array, hatches: dict[str, str]) -> dict[str, Any]:
+    """Cells that are no plain values, a hatch for each reason, and their entries for a legend."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import Patch
+
+    handles = {}
+    for reason in sorted(set(reasons.ravel()) - {""}):
+        pattern = hatches.setdefault(reason, _HATCHES[len(hatches) % len(_HATCHES)])
+        rows, columns = np.nonzero(reasons == reason)
+        corners = [
+            [(x_edges[j], y_edges[i]), (x_edges[j + 1], y_edges[i]), (x_edges[j + 1], y_edges[i + 1]), (x_edges[j], y_edges[i + 1])]
+            for i, j in zip(rows, columns, strict=True)
+        ]
+        empty = bool(np.isnan(grid[rows, columns]).any())
+        face = "0.93" if empty else "none"
+        edge = "0.35" if empty else "0.75"
+        axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0, hatch=pattern))
+        handles[reason] = Patch(facecolor="0.93" if empty else "0.45", edgecolor=edge, hatch=pattern, linewidth=0)
+    return handles
+
+
+def _draw_curve(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: Array, hatches: dict[str, str]) -> dict[str, Any]:
+    """A curve over one key; scenes without a plain value are marked at the foot, or on the curve."""
+    (key,) = dims
+    x, numbers = _positions(data, key)
+    order = np.argsort(x)
+    x, values, reasons = x[order], values[order], _reasons(data, values)[order]
+    axes.plot(x, values, "-", color="#0072b2", linewidth=1.6, marker=".", markersize=5)
+    axes.set(xlabel=_key_label(key), ylabel=_label(name))
+    axes.grid(color="0.92", linewidth=0.6)
+    if not numbers:
+        axes.set_xticks(x, [str(v) for v in data[key].values[order]])
+    foot = np.nanmin(values) if np.isfinite(values).any() else 0.0
+    handles = {}
+    for reason in sorted(set(reasons) - {""}):
+        hatches.setdefault(reason, _MARKERS[len(hatches) % len(_MARKERS)])
+        own = reasons == reason
+        places = np.where(np.isfinite(values[own]), values[own], foot)
+        (handles[reason],) = axes.plot(
+            x[own], places, linestyle="none", marker=hatches[reason], color="#222222", markerfacecolor="white", markersize=6
+        )
+    return handles

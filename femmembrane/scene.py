@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .discretization.meridian import Disc, Meridian, disc
+from .discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from .errors import InputError, unknown_name
 from .physics.magnetics import Dipole, Source
 from .physics.materials import Material, NeoHookean, Ogden
@@ -40,7 +41,7 @@ from .physics.scales import AGREEMENT, Scales
 
 MATERIALS: dict[str, Any] = {"neo-hookean": NeoHookean, "ogden": Ogden}
 SOURCES: dict[str, Any] = {"dipole": Dipole}
-SHAPES: dict[str, Any] = {"disc": Disc}
+SHAPES: dict[str, Any] = {"disc": Disc, "annulus": Annulus, "cap": Cap, "sphere": Sphere, "cylinder": Cylinder, "torus": Torus}
 CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")

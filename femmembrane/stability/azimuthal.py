@@ -16,7 +16,9 @@ and the quadratic form is, per reference area,
     + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: magnetic energy density)
 
 with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
-2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Integrals over theta are normalised as for n = 0, 2 pi
+2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. That is for ends that stay in the plane z = 0 or on the axis;
+with lids across the ends, made of horizontal radii where an end is no longer plane, by parts
+- Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c b_x + n b c_x) - n rho_x b c dx. Integrals over theta are normalised as for n = 0, 2 pi
 instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues do not depend on it. c plays no part at n = 0.
 """
 
@@ -31,7 +33,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from ..discretization.space import Space
+from ..discretization.space import Space, band_of
 from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
 from ..physics.tension_field import natural_strains
@@ -197,17 +199,18 @@ class _Layout:
 
     def __init__(self, space: Space, kind: int) -> None:
         degree, n_elements = space.degree, space.n_elements
-        n_nodes, n_local = degree * n_elements + 1, degree + 1
-        nodes = degree * np.arange(n_elements) + np.arange(n_local)[:, None]
-        free, opposite = _supports(space, kind, n_nodes)
+        n_local = degree + 1
+        nodes = space.nodes[degree * np.arange(n_elements) + np.arange(n_local)[:, None]]
+        free, opposite = _supports(space, kind)
         self.n_free = int(free.sum())
-        self.numbers: NDArray[np.int64] = np.full((n_nodes, 3), self.n_free, dtype=np.int64)
+        self.numbers: NDArray[np.int64] = np.full((space.n_nodes, 3), self.n_free, dtype=np.int64)
         self.numbers[free] = np.arange(self.n_free)
         self.numbers[opposite, _C // 2] = self.numbers[opposite, _A // 2]
         #: local row of c and element where c = -a on the axis
         self.flips = [(n_local, 0) if node == 0 else (2 * n_local - 1, n_elements - 1) for node in opposite]
         self.gather = np.concatenate([self.numbers[nodes, k] for k in range(3)])
-        self.half_bandwidth = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
+        open_curve = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
+        self.half_bandwidth = band_of(self.gather, self.n_free) if space.closed else open_curve
         self._tabulate(space)
         area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
         zero = np.zeros_like(area)
@@ -257,25 +260,33 @@ def _layout(space: Space, kind: int) -> _Layout:
     return _Layout(space, kind)
 
 
-def _supports(space: Space, kind: int, n_nodes: int) -> tuple[NDArray[np.bool_], list[int]]:
+def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
     """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
 
     What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
-    constant in-plane part at n = 1, and vanishes for larger n.
+    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing, and are no perturbations:
+    one node is held against them, which takes none of the others away.
     """
-    free = np.ones((n_nodes, 3), dtype=bool)
+    free = np.ones((space.n_nodes, 3), dtype=bool)
     opposite = []
     radius = space.mesh.position(space.mesh.breakpoints()[[0, -1]])[0]
-    for node, held, R in zip((0, n_nodes - 1), space.mesh.supports(), radius, strict=True):
-        in_plane, vertical = "u" not in held, "w" not in held
+    for node, support, R in zip(space.nodes[[0, -1]].tolist(), space.supports, radius, strict=False):
+        in_plane, vertical = "u" not in support.held, "w" not in support.held
         if abs(R) < 1e-12:
             rigid = kind == 1 and vertical  # a pole that is held vertically is a fixed point
             free[node] = [rigid, False, kind == 0 and vertical]
             opposite += [node] if rigid else []
         else:
-            free[node] = [in_plane, in_plane, vertical]
+            free[node] = [in_plane, in_plane, vertical] if kind == 0 or not support.rigid else False
+    pinned = space.nodes[space.widest]
     if kind == 0:
         free[:, _C // 2] = False
+        if space.pin is not None:
+            free[pinned, _B // 2] = False
+    if kind == 1:  # at this radius a shift is seen in c, a tilt in b
+        shift, tilt = space.rotations
+        free[pinned, _C // 2] &= not shift
+        free[pinned, _B // 2] &= not tilt
     return free, opposite
 
 
@@ -330,33 +341,56 @@ def _density(space: Space, r: LocalResponse, pressure: float, n: int) -> list[Ar
     J = np.hypot(space.R_x, space.Z_x)
     area = space.weights * space.R * J
     xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
-    work = -pressure * space.weights
     t, z = r.t_rho, r.t_z
     A, B, N1, N2 = r.A, r.B, r.N1, r.N2
     along, out, across = A * t**2 + N2 * z**2, A * z**2 + N2 * t**2, (A - N2) * t * z  # of e, of f, mixed
     _, m_r, _, m_rr, m_rz, m_zz = r.field
-    volume_c = work * r.eta
     entries = {
         (_A, _A): (r.W22 + n**2 * along) * oo + m_rr * area,
-        (_A, _AX): r.W12 * t * xo + volume_c,
+        (_A, _AX): r.W12 * t * xo,
         (_A, _C): n * (r.W22 + along) * oo,
-        (_A, _CX): -n * B * t * xo + n * volume_c,
-        (_A, _B): n**2 * across * oo + m_rz * area + work * r.rho_x,
+        (_A, _CX): -n * B * t * xo,
+        (_A, _B): n**2 * across * oo + m_rz * area,
         (_A, _BX): r.W12 * z * xo,
         (_AX, _AX): (r.W11 * t**2 + N1 * z**2) * xx,
-        (_AX, _C): n * r.W12 * t * xo + n * volume_c,
-        (_AX, _B): work * r.rho,
+        (_AX, _C): n * r.W12 * t * xo,
         (_AX, _BX): (r.W11 - N1) * t * z * xx,
         (_C, _C): (n**2 * r.W22 + along) * oo + m_r / r.rho * area,
-        (_C, _CX): -B * t * xo + volume_c,
-        (_C, _B): n * across * oo + n * work * r.rho_x,
+        (_C, _CX): -B * t * xo,
+        (_C, _B): n * across * oo,
         (_C, _BX): n * r.W12 * z * xo,
         (_CX, _CX): A * xx,
         (_CX, _B): -n * B * z * xo,
         (_B, _B): n**2 * out * oo + m_zz * area,
         (_BX, _BX): (r.W11 * z**2 + N1 * t**2) * xx,
     }
-    return [entries[pair] for pair in _PAIRS]
+    for pair, part in _volume_density(space, r, -pressure * space.weights, n).items():
+        entries[pair] = entries[pair] + part if pair in entries else part
+    return [entries.get(pair, np.zeros_like(area)) for pair in _PAIRS]
+
+
+def _volume_density(space: Space, r: LocalResponse, work: Array, n: int) -> dict[tuple[int, int], Array]:
+    """Second derivatives of the enclosed volume over 2 pi, times ``work``."""
+    if space.lids:
+        return {
+            (_A, _A): -work * r.eta_x,
+            (_A, _C): -n * work * r.eta_x,
+            (_A, _BX): -work * r.rho,
+            (_C, _C): -work * r.eta_x,
+            (_C, _B): n / 2 * work * r.rho_x,
+            (_C, _BX): -n / 2 * work * r.rho,
+            (_CX, _B): -n / 2 * work * r.rho,
+        }
+    volume_c = work * r.eta
+    return {
+        (_A, _AX): volume_c,
+        (_A, _CX): n * volume_c,
+        (_A, _B): work * r.rho_x,
+        (_AX, _C): n * volume_c,
+        (_AX, _B): work * r.rho,
+        (_C, _CX): volume_c,
+        (_C, _B): n * work * r.rho_x,
+    }
 
 
 @one_thread

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization.space import space_of
+from ..discretization.space import space_of_scene
 from ..physics.kinematics import meridional_strain
 from ..physics.magnetics import magnetic_field
 from ..physics.scales import Scales
@@ -71,7 +71,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
         P = p R0/(mu T); enters the total stresses only.
     s : ndarray, shape (n,)
     """
-    space = space_of(scene.mesh, scene.degree)
+    space = space_of_scene(scene)
     u, _, w, _ = space.evaluate(x, s)
     u_s, w_s = space.recovered_slopes(x, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)

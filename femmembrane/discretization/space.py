@@ -58,6 +58,8 @@ class Space:
         Nodes, counted along the meridian, that are on the axis or the rim of a rigid disc across it.
     nodes : ndarray of int, shape (degree n_elements + 1,)
         Number of each node in the order of the unknowns, along the meridian.
+    loose : bool
+        Whether something outside alone holds the membrane along the axis.
     pin : int or None
         Node held along the axis, counted along the meridian: ``widest`` or none.
     widest : int
@@ -67,6 +69,8 @@ class Space:
     n_elements, n_quadrature, n_free, half_bandwidth : int
     R, R_x, Z, Z_x : ndarray, shape (n_quadrature, n_elements)
         Reference meridian at the quadrature points; _x is the derivative along the reference element [0, 1].
+    lengths : ndarray, shape (n_elements,)
+        Arc length of each element at rest.
     weights : ndarray, shape (n_quadrature, n_elements)
         2 pi times the quadrature weight on the reference element.
     """
@@ -84,6 +88,7 @@ class Space:
         self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
         self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
         self._support(n_nodes)
@@ -101,6 +106,7 @@ class Space:
         self.n_nodes = n_nodes - int(self.closed)
         adrift = floats(self.supports)
         in_plane = [pole or ("w" in end.held and height == 0) for pole, end, height in zip(on_axis, self.supports, Z, strict=False)]
+        self.loose = adrift and self.anchored
         self.lids = adrift or not all(in_plane)
         self.rotations = (False, False) if self.anchored else free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
         radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there

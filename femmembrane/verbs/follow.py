@@ -19,12 +19,13 @@ from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl,
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
 from ..solve.search import Limit, beyond_limit
-from ..solve.start import START_VOLUME, flat_state, start_at_height, start_at_pressure, start_at_volume
+from ..solve.start import at_rest, flat_state, moderate, start_at_height, start_at_pressure, start_at_volume
 from ..solve.state import Path, State
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness
 from ..threads import one_thread
 from .meshing import on_chosen_mesh
+from .arguments import check_height
 from .recording import OnStep, record, resume
 from .trace import trace
 
@@ -188,6 +189,8 @@ def _follow(
             raise
         return Branch(scene, (), error.status, str(error))
     clock, potential = time.perf_counter(), potential_of(scene)
+    if control == "height":
+        check_height("center_height", potential)
     timings |= {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
@@ -266,7 +269,7 @@ class _Walk:
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
             self.state, self.path = self._first(load), Path()
-        elif load == 0 and not self.potential.sources:
+        elif at_rest(self.potential, self.quantity, load):
             self.state, self.path = flat_state(self.potential), Path()
         elif load != self.load:
             try:
@@ -310,7 +313,7 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
         raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
     scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
-    state = start_at_volume(potential, START_VOLUME) if start is None else resume(potential, start)
+    state = start_at_volume(potential, potential.space.reference_volume + moderate(potential)) if start is None else resume(potential, start)
     # the amount that holds the state at hand is known: march from it to the wanted one
     held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
     if held <= 0 or state.volume <= -gas.chamber:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from .accuracy.error_estimate import ErrorEstimate as ErrorEstimate
     from .discretization.meridian import Disc as Disc
     from .discretization.meridian import disc as disc
+    from .discretization.mesh_files import Curve as Curve
+    from .discretization.mesh_files import meridian_from_points as meridian_from_points
+    from .discretization.mesh_files import read_meridian as read_meridian
+    from .discretization.mesh_files import write_meridian as write_meridian
     from .discretization.shapes import Annulus as Annulus
     from .discretization.shapes import Cap as Cap
     from .discretization.shapes import Cylinder as Cylinder
@@ -71,6 +75,7 @@ _ROOMS = {
     "accuracy.convergence": ("Convergence",),
     "accuracy.error_estimate": ("Deviation", "ErrorEstimate"),
     "discretization.meridian": ("Disc", "disc"),
+    "discretization.mesh_files": ("Curve", "meridian_from_points", "read_meridian", "write_meridian"),
     "discretization.shapes": (
         *("Annulus", "Cap", "Cylinder", "Sphere", "Torus"),
         *("annulus", "cap", "cylinder", "sphere", "torus"),

@@ -56,6 +56,8 @@ class Space:
         radius of the wall at such an end and zero at others. The volume then has the further term pi [wall w] of the ends.
     axis_nodes : list of int
         Nodes, counted along the meridian, that are on the axis or the rim of a rigid disc across it.
+    hubs : list of {0, -1}
+        The ends that are rims of rigid discs, the first or the last.
     nodes : ndarray of int, shape (degree n_elements + 1,)
         Number of each node in the order of the unknowns, along the meridian.
     loose : bool
@@ -69,6 +71,8 @@ class Space:
     n_elements, n_quadrature, n_free, half_bandwidth : int
     R, R_x, Z, Z_x : ndarray, shape (n_quadrature, n_elements)
         Reference meridian at the quadrature points; _x is the derivative along the reference element [0, 1].
+    radial : bool
+        Whether the parameter of the meridian is its radius.
     lengths : ndarray, shape (n_elements,)
         Arc length of each element at rest.
     weights : ndarray, shape (n_quadrature, n_elements)
@@ -88,6 +92,7 @@ class Space:
         self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
         self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.radial = bool((self.R == self.s).all())
         self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
@@ -102,6 +107,7 @@ class Space:
         R, Z = self.mesh.position(self.ends[[0, -1]])
         on_axis = np.abs(R) < 1e-12
         self.axis_nodes = [] if self.closed else [k * (n_nodes - 1) for k in (0, 1) if on_axis[k] or self.supports[k].rigid]
+        self.hubs = [-k for k, support in enumerate(self.supports) if support.rigid]
         self.nodes: NDArray[np.int64] = _folded(n_nodes) if self.closed else np.arange(n_nodes)
         self.n_nodes = n_nodes - int(self.closed)
         adrift = floats(self.supports)
@@ -169,6 +175,21 @@ class Space:
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
         return float(self.first_height + (x[self.pole] if self.pole < self.n_free else 0.0))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """In words, what is done about motions of the membrane as a whole that the supports leave."""
+        R, Z = (float(c[0]) for c in self.mesh.position(self.ends[[self.widest // self.degree]]))
+        where = f"the circle r = {R:.4g}, z = {Z:.4g}"
+        notes = []
+        if self.loose:
+            notes.append("nothing but the sources holds the membrane along the axis")
+        if self.pin is not None:
+            notes.append(f"nothing holds the membrane along the axis: {where} is kept at its height, without any force")
+        if any(self.rotations):
+            moves = " and ".join(name for name, free in zip(("shifts", "tilts"), self.rotations, strict=True) if free)
+            notes.append(f"{moves} across the axis cost no energy: they are left out of verdicts on n = 1")
+        return tuple(notes)
 
     def axis_heights(self, x: Array) -> Array:
         """Heights of the nodes on the axis and of rigid discs across it."""

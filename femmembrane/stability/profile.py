@@ -26,6 +26,8 @@ class Profile:
     ----------
     r : ndarray
         Reference radius over R0.
+    s : ndarray or None
+        Arc length of the reference meridian from its first end, over R0; None where it runs along the radius, from R = s.
     rho, eta : ndarray
         Deformed radius and height over R0.
     strain : (ndarray, ndarray)
@@ -35,6 +37,7 @@ class Profile:
     """
 
     r: Array
+    s: Array | None
     rho: Array
     eta: Array
     strain: tuple[Array, Array]
@@ -45,6 +48,7 @@ class Profile:
         """The profile by the names of its columns, with stretches in place of strains, and the stresses in Pa too if there are scales."""
         columns = {
             "r": self.r,
+            **({} if self.s is None else {"s": self.s}),
             "rho": self.rho,
             "eta": self.eta,
             "stretch_1": np.exp(self.strain[0]),
@@ -84,4 +88,4 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
     total = total_stress(mechanical, pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
-    return Profile(R, rho, eta, (e1, e2), mechanical, total)
+    return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total)

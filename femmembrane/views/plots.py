@@ -141,7 +141,7 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
 
 
 def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
-    """Taut and wrinkled zones: reference radius against volume, or against the step where the volume is not monotone.
+    """Taut and wrinkled zones: reference radius (of a curved meridian: arc length) against volume, or against the step where the volume is not monotone.
 
     Parameters
     ----------
@@ -162,7 +162,8 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
     handles = fill_zones(axes, branch, volume if monotone else np.arange(volume.size, dtype=float))
     axes.set_xlabel(VOLUME_LABEL if monotone else "step")
-    axes.set_ylabel("reference radius r/R₀")
+    flat = "s" not in branch[0].profile()
+    axes.set_ylabel("reference radius r/R₀" if flat else "arc length of the reference meridian s/R₀")
     axes.margins(0)
     figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
     return save_figure(figure, path)
@@ -460,23 +461,33 @@ def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) 
 
 
 def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style, *, zones: bool | None = None) -> None:
-    """The deformed meridian, both halves, under the style's label; with the wrinkled zones, by default when the scene asks for them."""
+    """The deformed meridian, both halves, and rigid hubs, under the style's label.
+
+    With the wrinkled zones, by default when the scene asks for them.
+    """
     if equilibrium.scene.analysis.wrinkling if zones is None else zones:
         draw_meridian_zones(axes, equilibrium)
     profile = smooth_profile(equilibrium, points=_CURVE)
     rho, eta = profile["rho"], profile["eta"]
     look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
-    axes.plot(np.concatenate([-rho[::-1], rho]), np.concatenate([eta[::-1], eta]), label=style.label or None, **look)
+    cut = [np.nan] if rho[0] > 0 else []  # the halves meet on the axis only
+    axes.plot(np.concatenate([-rho[::-1], cut, rho]), np.concatenate([eta[::-1], cut, eta]), label=style.label or None, **look)
+    for k in equilibrium.potential.space.hubs:
+        axes.plot([-rho[k], rho[k]], [eta[k], eta[k]], color=style.color, linewidth=3 * style.width, solid_capstyle="butt", alpha=0.5)
 
 
 def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium]) -> None:
-    """What drawn meridians stand in: labelled axes of equal scale, the clamped rim, and the magnetic sources of their scene."""
+    """What drawn meridians stand in: labelled axes of equal scale, clamped ends, and the magnetic sources of their scene."""
     axes.set_xlabel(RADIUS_LABEL)
     axes.set_ylabel("height η/R₀")
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(nbins=6)
     axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
-    axes.plot([-1, 1], [0, 0], "s", color="black", markersize=5, zorder=5)
+    space = shown[0].potential.space
+    (R, Z), fixed = space.mesh.position(space.ends[[0, -1]]), frozenset("uw")
+    for k, support in enumerate(space.supports):
+        if support.held == fixed:
+            axes.plot([-R[k], R[k]], [Z[k], Z[k]], "s", color="black", markersize=5, zorder=5)
     _draw_sources(axes, shown)
 
 

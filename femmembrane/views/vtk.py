@@ -72,12 +72,16 @@ class Revolution:
     line: NDArray[np.int32]
 
     @classmethod
-    def of(cls, r: Array, sectors: int = SECTORS) -> Revolution:
-        """Revolve nodes at the reference radii r; a node with r = 0 lies on the axis."""
+    def of(cls, r: Array, sectors: int = SECTORS, closed: bool = False) -> Revolution:
+        """Revolve nodes at the reference radii r; a node with r = 0 lies on the axis, and the last one of a closed curve is the first."""
         copies = np.where(r > 0, sectors, 1)
+        if closed:
+            copies[-1] = 0
         first = np.cumsum(copies) - copies
         turn = np.arange(sectors)
-        point = first[:, None] + np.where(copies[:, None] > 1, turn, 0)
+        point = first[:, None] + np.where(copies[:, None] == 1, 0, turn)
+        if closed:
+            point[-1] = point[0]
         a, b = point[:-1], point[1:]
         cells = np.stack([a, b, np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)], axis=2).reshape(-1, 4).astype(np.int32)
         inner, outer = cells[:, 0] == cells[:, 3], cells[:, 1] == cells[:, 2]
@@ -154,12 +158,12 @@ def remove_surfaces(path: Path, keep: int = 0) -> None:
 def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array]:
     """The profile at the nodes, with any value that is not defined on the axis (0/0) taken from the node next to it.
 
-    With fewer nodes than ``points`` it is taken at that many radii instead, where the meridian is a function of the radius, so that
-    the curvature of long elements shows.
+    With fewer nodes than ``points`` it is taken at that many places instead, so that the curvature of long elements shows.
     """
     found = equilibrium.profile()
-    if found["r"].size < points and (np.diff(found["r"]) > 0).all():
-        found = equilibrium.profile(np.linspace(found["r"][0], found["r"][-1], points))
+    if found["r"].size < points:
+        s = equilibrium.potential.space.node_parameters()
+        found = equilibrium.profile(np.linspace(s[0], s[-1], points))
     profile = {key: np.array(values, dtype=np.float64) for key, values in found.items()}
     for values in profile.values():
         for end, beside in ((0, 1), (-1, -2)):
@@ -200,6 +204,7 @@ def render(
             plotter.set_background("white")
             plotter.enable_anti_aliasing("ssaa")
             drawn = _draw_membrane(plotter, profile, quantity, size[1] / 900)
+            _draw_hubs(plotter, equilibrium, profile)
             drawn += _draw_sources(plotter, equilibrium, profile, size[1] / 900)
             _aim(plotter, np.concatenate(drawn))
             plotter.screenshot(str(temporary))
@@ -218,7 +223,7 @@ def _one(shown: Branch | Equilibrium) -> Equilibrium:
 def _write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
     import meshio
 
-    revolution = Revolution.of(profile["r"])
+    revolution = Revolution.of(profile["r"], closed=equilibrium.potential.space.closed)
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
     rho, eta = profile["rho"], profile["eta"]
     R, Z = equilibrium.scene.mesh.position(equilibrium.potential.space.node_parameters())
@@ -255,10 +260,10 @@ def _collection(path: Path, files: list[Path]) -> str:
 
 
 def _draw_membrane(plotter: pyvista.Plotter, profile: Mapping[str, Array], quantity: str, scale: float) -> list[Array]:
-    """Draw the surface, its rim and a few parallels; the points that must be in the picture."""
+    """Draw the surface, its rims and a few parallels; the points that must be in the picture."""
     import pyvista
 
-    revolution = Revolution.of(profile["r"], sectors=4 * SECTORS)
+    revolution = Revolution.of(profile["r"], 4 * SECTORS, is_closed(profile["rho"], profile["eta"]))
     points = revolution.vectors(profile["rho"], profile["eta"])
     faces = np.concatenate([np.insert(c, 0, c.shape[1], axis=1).ravel() for c in (revolution.triangles, revolution.quads)])
     surface = pyvista.PolyData(points, faces=faces)
@@ -286,11 +291,29 @@ def _draw_membrane(plotter: pyvista.Plotter, profile: Mapping[str, Array], quant
     return [points]
 
 
+def is_closed(rho: Array, eta: Array) -> bool:
+    """Whether a deformed meridian ends where it starts, off the axis."""
+    gap = max(abs(rho[0] - rho[-1]), abs(eta[0] - eta[-1]))
+    return bool(rho[0] > 0 and gap <= 1e-9 * (np.ptp(rho) + np.ptp(eta)))
+
+
 def _drawn_circles(rho: Array, eta: Array, count: int = 6) -> list[tuple[int, float]]:
-    """Nodes whose circles are drawn, with their thickness: the rim, and a few at equal distances along the meridian to show the shape."""
+    """Nodes whose circles are drawn, with their thickness: the rims, and a few at equal distances along the meridian to show the shape."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rho), np.diff(eta)))])
-    inner = np.searchsorted(length, length[-1] * np.arange(1, count) / count)
-    return [*((int(node), 0.0015) for node in np.unique(inner) if 0 < node < rho.size - 1), (rho.size - 1, 0.005)]
+    closed = is_closed(rho, eta)
+    inner = np.unique(np.searchsorted(length, length[-1] * np.arange(1 - int(closed), count) / count))
+    rims = [] if closed else [k for k in (0, rho.size - 1) if rho[k] > 1e-9 * length[-1]]
+    return [*((int(node), 0.0015) for node in inner if closed or 0 < node < rho.size - 1), *((k, 0.005) for k in rims)]
+
+
+def _draw_hubs(plotter: pyvista.Plotter, equilibrium: Equilibrium, profile: Mapping[str, Array]) -> None:
+    """The rigid discs that close an end."""
+    import pyvista
+
+    for k in equilibrium.potential.space.hubs:
+        center = (0.0, 0.0, float(profile["eta"][k]))
+        disc = pyvista.Disc(center=center, inner=0.0, outer=float(profile["rho"][k]), normal=(0, 0, 1), c_res=4 * SECTORS)
+        plotter.add_mesh(disc, color="#9a9a9a", ambient=0.4, diffuse=0.6)
 
 
 def _extent(profile: Mapping[str, Array]) -> float:

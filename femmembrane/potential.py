@@ -120,6 +120,16 @@ class Potential:
         return float((space.weights * space.R * np.hypot(space.R_x, space.Z_x)).sum())
 
     @cached_property
+    def rigid(self) -> Array | None:
+        """Where the membrane can move along the axis as a whole: the mass times that motion, of mass one, shape (n_free, 1)."""
+        space = self.space
+        if space.pin is None:
+            return None
+        density = np.zeros((4, *space.R.shape))
+        density[2] = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        return space.assemble_vector(density.reshape(-1, space.n_elements))[:, None] / np.sqrt(self.area)
+
+    @cached_property
     def point_function(self) -> ca.Function:
         """(data, local variables, (P, magnetic factor)) -> values, gradients and the Hessian at one point."""
         t, (data, local, parameters) = self.terms, self.symbols

@@ -54,6 +54,8 @@ class Space:
     wall : (ndarray, ndarray) or None
         Where an end slides along a wall: a function of the meridian, and its slope along the reference element, that is the squared
         radius of the wall at such an end and zero at others. The volume then has the further term pi [wall w] of the ends.
+    on_axis : ndarray of bool, shape (2,)
+        Whether each end is on the axis.
     axis_nodes : list of int
         Nodes, counted along the meridian, that are on the axis or the rim of a rigid disc across it.
     hubs : list of {0, -1}
@@ -105,7 +107,7 @@ class Space:
         self.supports = tuple(as_support(held) for held in self.mesh.supports())
         self.closed = not self.supports
         R, Z = self.mesh.position(self.ends[[0, -1]])
-        on_axis = np.abs(R) < 1e-12
+        self.on_axis = on_axis = np.abs(R) < 1e-12
         self.axis_nodes = [] if self.closed else [k * (n_nodes - 1) for k in (0, 1) if on_axis[k] or self.supports[k].rigid]
         self.hubs = [-k for k, support in enumerate(self.supports) if support.rigid]
         self.nodes: NDArray[np.int64] = _folded(n_nodes) if self.closed else np.arange(n_nodes)

@@ -38,10 +38,11 @@ from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
-from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from ..solve.banded import band_product
 from ..solve.wellposed import ill_posed, interval, unsupported
 from ..threads import one_thread
-from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
+from .floating import pencil_of, rigid_part
+from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
 from .verdict import Verdict, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
@@ -179,6 +180,8 @@ class AzimuthalOperator:
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
+    rigid : ndarray, shape (n_free, k), or None
+        Motions of the membrane as a whole that nothing resists, see :mod:`.floating`.
     """
 
     band: Array
@@ -188,6 +191,11 @@ class AzimuthalOperator:
     n: int
     response: LocalResponse
     space: Space
+    rigid: Array | None = None
+
+    def pencil(self, constraint: Array | None = None) -> Pencil:
+        """K - lambda M, rigid motions taken out."""
+        return pencil_of(self.band, self.mass, self.half_bandwidth, constraint, 0.0, self.rigid)
 
     def shape(self, mode: Array) -> dict[str, Array]:
         """A mode at the nodes, see :func:`azimuthal_shape`."""
@@ -226,6 +234,7 @@ class _Layout:
             columns = slice(field * n_local, (field + 1) * n_local)
             rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
             rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
+        self._values = space.table[: space.n_quadrature, :n_local]
         outer = []
         for i, j in _PAIRS:
             product = np.einsum("qa,qb->abq", rows[i], rows[j])
@@ -246,6 +255,14 @@ class _Layout:
         depth = 3 * self.half_bandwidth + 1
         flat: Array = np.bincount(self._band_index, local.ravel(), self.n_free * depth + 1)  # type: ignore[assignment]  # weighted: floats
         return flat[:-1].reshape(self.n_free, depth).T
+
+    def integrate(self, density: Array) -> Array:
+        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions."""
+        local = np.concatenate([self._values.T @ part for part in density])
+        for row, element in self.flips:
+            local[row, element] *= -1
+        total: Array = np.bincount(self.gather.ravel(), local.ravel(), self.n_free + 1)  # type: ignore[assignment]  # weighted: floats
+        return total[: self.n_free]
 
     def local(self, mode: Array) -> Array:
         """Coefficients of (a, c, b) in each element, shape (3 (degree + 1), n_elements)."""
@@ -320,7 +337,29 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
     band = layout.assemble(_density(space, response, pressure, n))
-    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space)
+    rigid = _rigid_motions(space, layout, response, int(n))
+    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, rigid)
+
+
+def _rigid_motions(space: Space, layout: _Layout, r: LocalResponse, n: int) -> Array | None:
+    """The part of the mass that belongs to motions as a whole: along the axis at n = 0; a shift and a tilt, if they are free, at n = 1."""
+    one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
+    shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
+    if n == 0:
+        motions = [(zero, zero, one)] if space.pin is not None else []
+    else:
+        free = space.rotations if n == 1 else (False, False)
+        motions = [motion for motion, is_free in zip((shift, tilt), free, strict=True) if is_free]
+        if free == (False, True):  # about the circle that is held in its plane
+            place = next(k for k, support in enumerate(space.supports) if "u" in support.held and not space.on_axis[k])
+            height = (r.eta[0, 0], r.eta[-1, -1])[place]
+            motions = [(r.eta - height, height - r.eta, -r.rho)]
+    if not motions:
+        return None
+    area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+    fields = np.array(motions)
+    gram = np.einsum("ifqe,jfqe,qe->ij", fields, fields, area)
+    return rigid_part(np.stack([layout.integrate(motion * area) for motion in fields], axis=1), gram)
 
 
 @lru_cache(maxsize=4)
@@ -409,20 +448,21 @@ def azimuthal_eigenvalue(potential: Potential, x: Array, pressure: float, n: int
 
 def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigenvalue:
     start = _Spectrum(operator, None).first_guess() if guess is None else guess
-    return smallest_eigenvalue(operator.band, operator.mass, operator.half_bandwidth, None, start)
+    return smallest_of(operator.pencil(), start)
 
 
 class _Spectrum:
     """The pencil (K, M), with constraint . phi = 0 if given."""
 
     def __init__(self, operator: AzimuthalOperator, constraint: Array | None) -> None:
-        self.band, self.mass, self.kd, self.constraint = operator.band, operator.mass, operator.half_bandwidth, constraint
+        self.pencil = operator.pencil(constraint)
+        self.band, self.kd, self.constraint = operator.band, operator.half_bandwidth, constraint
         self.n = int(operator.band.shape[1])
-        self.scale = float(np.abs(self.band[2 * self.kd] / self.mass[2 * self.kd]).max())
+        self.scale = self.pencil.scale
 
     def count(self, shift: float) -> int:
         """Number of eigenvalues below a shift, by inertia."""
-        return negative_directions(self.band - shift * self.mass, self.kd, self.constraint)
+        return self.pencil.count(shift)
 
     def lower_bound(self) -> float:
         """A shift below the spectrum."""
@@ -435,29 +475,31 @@ class _Spectrum:
 
     def first_guess(self, width: int = 6, iterations: int = 3) -> Array:
         """Best vector of a block of inverse iterations: the lowest azimuthal eigenvalues are too close together for a single vector."""
-        solver = BandFactor(self.band - self.lower_bound() * self.mass)
+        solver = self.pencil.shifted_solver(self.lower_bound())  # only without a constraint
         block = np.random.default_rng(0).standard_normal((self.n, min(width, self.n)))
 
-        def times(band: Array) -> Array:
-            return np.stack([band_product(band, self.kd, column) for column in block.T], axis=1)
+        def times(product: Callable[[Array], Array]) -> Array:
+            return np.stack([product(column) for column in block.T], axis=1)
 
         for _ in range(iterations):
-            block = np.linalg.qr(solver.solve(times(self.mass)))[0]
-        return np.asarray(block @ eigh(block.T @ times(self.band), block.T @ times(self.mass))[1][:, 0])
+            block = np.linalg.qr(solver.solve(times(self.pencil.times_mass)))[0]
+        return np.asarray(block @ eigh(block.T @ times(self._stiffness), block.T @ times(self.pencil.times_mass))[1][:, 0])
+
+    def _stiffness(self, x: Array) -> Array:
+        return band_product(self.band, self.kd, x)
 
     def lanczos(self, count: int, width: int) -> list[tuple[float, Array]]:
         """Shift-invert Lanczos iterations from a certified lower bound."""
         shift = self.lower_bound()
-        factor = BandFactor(self.band - shift * self.mass)
-        bordered = None if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, 0.0)
+        solver = self.pencil.shifted_solver(shift)
 
         def inverse(right: Array) -> Array:
-            return factor.solve(right.ravel()) if bordered is None else bordered.solve(right.ravel(), 0.0)[0]
+            return self.pencil.solve(solver, right.ravel())
 
         def operator(matvec: Callable[[Array], Array]) -> LinearOperator:
             return LinearOperator((self.n, self.n), matvec=matvec, dtype=float)
 
-        stiffness, mass = (operator(partial(_flat_product, band, self.kd)) for band in (self.band, self.mass))
+        stiffness, mass = (operator(lambda x, product=product: product(x.ravel())) for product in (self._stiffness, self.pencil.times_mass))
         start = inverse(np.random.default_rng(0).standard_normal(self.n))
         try:
             values, modes = eigsh(stiffness, k=count, M=mass, sigma=shift, OPinv=operator(inverse), v0=start, ncv=width, tol=1e-12)
@@ -467,12 +509,8 @@ class _Spectrum:
 
     def normalised(self, mode: Array) -> Array:
         """With mode . M mode = 1, the largest entry positive."""
-        size = np.sqrt(mode @ band_product(self.mass, self.kd, mode))
+        size = np.sqrt(mode @ self.pencil.times_mass(mode))
         return mode / (size * np.sign(mode[np.argmax(np.abs(mode))]))
-
-
-def _flat_product(band: Array, half_bandwidth: int, x: Array) -> Array:
-    return band_product(band, half_bandwidth, x.ravel())
 
 
 @one_thread

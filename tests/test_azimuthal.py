@@ -203,12 +203,40 @@ def _surface_energies(potential: Potential, x: np.ndarray, mode: np.ndarray, n: 
     weights = space.weights[..., None] / len(angle)
     elastic = potential.material.energy(np.log(mean + radius) / 2, np.log(mean - radius) / 2)
     magnetic = potential.field_energy(np.hypot(rho, theta), z + 0 * theta)[0].reshape(elastic.shape)
-    if space.lids:
+    if space.lids and (n == 0 or space.spreads):
         across = rho * (along[1] * around[2] - along[2] * around[1]) + theta * (along[2] * around[0] - along[0] * around[2])
         volume = across / 2
     else:
         volume = z * (along[0] * around[1] - along[1] * around[0])
-    return np.array([(weights * R * J * elastic).sum(), (weights * R * J * magnetic).sum(), (weights * volume).sum()])
+    enclosed = (weights * volume).sum()
+    for end, support in enumerate(space.supports):
+        if not support.held:
+            enclosed += (1 - 2 * end) * _film(*_edge(potential, x, step * mode, n, end, angle))
+    return np.array([(weights * R * J * elastic).sum(), (weights * R * J * magnetic).sum(), enclosed])
+
+
+def _edge(potential: Potential, x: np.ndarray, mode: np.ndarray, n: int, end: int, angle: np.ndarray) -> np.ndarray:
+    """Points (x, y, z) of the displaced edge at an end, each of shape (len(angle),)."""
+    space = potential.space
+    nodal, s = azimuthal_shape(space, n, mode), space.ends[[-end]]
+    (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(x, s)
+    a, c, b = (nodal[k][-end] for k in "ucw")
+    rho, theta = R + u + a * np.cos(n * angle), c * np.sin(n * angle)
+    z = Z + w + b * np.cos(n * angle)
+    return np.array([rho * np.cos(angle) - theta * np.sin(angle), rho * np.sin(angle) + theta * np.cos(angle), z])
+
+
+def _film(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
+    """Volume between the harmonic surface over a closed plane curve with given heights and the one of radii to the axis."""
+    r, phi, m = np.hypot(x, y), np.arctan2(y, x), np.arange((len(x) - 1) // 2)
+    size = r.mean()
+    waves = (r[:, None] / size) ** m * np.cos(m * phi[:, None])
+    # of the symmetric curve, harmonics; their integral over the area is that of r^m cos(m phi)/(m + 2) times x dy - y dx around it
+    coefficients = np.linalg.lstsq(waves, z, rcond=1e-12)[0]
+    k = np.fft.fftfreq(len(x), 1 / len(x))
+    x_t, y_t = (np.fft.ifft(1j * k * np.fft.fft(f)).real for f in (x, y))
+    swept = (x * y_t - y * x_t) * 2 * np.pi / len(x)
+    return float(swept @ (waves @ (coefficients / (m + 2))) - swept @ z / 2)
 
 
 def azimuthal_fields(potential: Potential, mode: np.ndarray, n: int) -> np.ndarray:
@@ -229,6 +257,7 @@ SURFACES = {
     "annulus with a hub": fm.annulus(0.3, elements=6),
     "sphere": fm.sphere(elements=6),
     "tube": fm.cylinder(1.5, elements=6, top="free", bottom="mirror"),
+    "open tube": fm.cylinder(1.5, elements=6, top="free", bottom="free"),
     "torus": fm.torus(2.5, elements=6),
 }
 

@@ -156,7 +156,10 @@ class Curve:
     def supports(self) -> tuple[Support, Support] | tuple[()]:
         if self.closed:
             return ()
-        first, last = (POLE if point[0] == 0 else SUPPORTS[name] for point, name in zip((self.points[0], self.points[-1]), (self.first, self.last), strict=True))
+        first, last = (
+            POLE if point[0] == 0 else SUPPORTS[name]
+            for point, name in zip((self.points[0], self.points[-1]), (self.first, self.last), strict=True)
+        )
         return first, last
 
 
@@ -216,7 +219,11 @@ def read_meridian(path: str | PathLike[str], *, divisions: int = 1, first: str =
     except (Exception, SystemExit) as error:  # its readers raise what they like, and some end the program
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError("mesh.file", str(path), f"cannot be read as a mesh ({reason[:200]})") from None
-    kinds = {kind: np.concatenate([block.data for block in mesh.cells if block.type == kind]) for kind in ("line", "line3") if kind in mesh.cells_dict}
+    kinds = {
+        kind: np.concatenate([block.data for block in mesh.cells if block.type == kind])
+        for kind in ("line", "line3")
+        if kind in mesh.cells_dict
+    }
     if len(kinds) != 1:
         found = ", ".join(sorted(mesh.cells_dict)) or "none"
         raise InputError("mesh.file", str(path), f"line cells of one kind are allowed, line or line3; cells in the file: {found}")
@@ -286,7 +293,11 @@ def _array(points: Any) -> Array:
 
 
 def _points(points: Any) -> tuple[tuple[float, float], ...]:
-    if isinstance(points, tuple) and all(isinstance(p, tuple) and len(p) == 2 and all(type(c) is float for c in p) for p in points) and len(points) > 1:
+    if (
+        isinstance(points, tuple)
+        and all(isinstance(p, tuple) and len(p) == 2 and all(type(c) is float for c in p) for p in points)
+        and len(points) > 1
+    ):
         return points
     rows = _array(points)
     if any(isinstance(c, (bool, str)) or not isinstance(c, Real) for point in points for c in point):
@@ -311,7 +322,7 @@ def _check_curve(curve: Curve) -> None:
         if R < 0:
             raise _refuse(cell, f"cell {cell} has the point ({R:g}, {Z:g}); radii >= 0 are allowed")
         inside = 0 < k < len(points) - 1
-        if (inside or curve.closed) and R <= _ON_AXIS * size:
+        if (inside or curve.closed) and _ON_AXIS * size >= R:
             raise _refuse(cell, f"cell {cell} touches the axis at ({R:g}, {Z:g}) inside the curve; only ends may (poles)")
         if not inside and 0 < R <= _ON_AXIS * size:
             raise _refuse(cell, f"cell {cell} ends at R = {R:g}; 0 is allowed (a pole), or a radius that is no round-off")
@@ -334,7 +345,14 @@ def _check_curve(curve: Curve) -> None:
 
 def _ordered(points: Array, cells: NDArray[Any], **rest: Any) -> Curve:
     """The curve of points and cells in any order."""
-    if cells.ndim != 2 or cells.shape[1] not in (2, 3) or not len(cells) or cells.dtype.kind not in "iu" or cells.min() < 0 or cells.max() >= len(points):
+    if (
+        cells.ndim != 2
+        or cells.shape[1] not in (2, 3)
+        or not len(cells)
+        or cells.dtype.kind not in "iu"
+        or cells.min() < 0
+        or cells.max() >= len(points)
+    ):
         raise InputError("mesh.points", "cells", "cells of two or three existing points each are allowed")
     chain = _chain(cells.tolist())
     ordered = points[[place for cell, forward in chain for place in _run(cells[cell].tolist(), forward)[:-1]]]
@@ -368,11 +386,12 @@ def _chain(cells: Sequence[Sequence[int]]) -> list[tuple[int, bool]]:
     node = ends[0] if ends else cells[0][0]
     chain: list[tuple[int, bool]] = []
     used: set[int] = set()
-    while (cell := next((k for k in at[node] if k not in used), None)) is not None:
-        forward = cells[cell][0] == node
-        chain.append((cell, forward))
-        used.add(cell)
-        node = cells[cell][1 if forward else 0]
+    while following := [k for k in at[node] if k not in used]:
+        k = following[0]
+        forward = cells[k][0] == node
+        chain.append((k, forward))
+        used.add(k)
+        node = cells[k][1 if forward else 0]
     if len(used) < len(cells):
         left = min(set(range(len(cells))) - used)
         raise _refuse(left, f"cell {left} is not joined to cell {chain[0][0]}: one curve is allowed")

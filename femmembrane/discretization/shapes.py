@@ -303,9 +303,7 @@ class Torus:
         return ()
 
 
-def annulus(
-    inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: str = "hub", outer: str = "clamped"
-) -> Annulus:
+def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: str = "hub", outer: str = "clamped") -> Annulus:
     """Mesh of a flat ring; see :class:`Annulus`."""
     return Annulus(inner_radius=inner_radius, elements=elements, ratio=ratio, inner=inner, outer=outer)
 

@@ -56,6 +56,10 @@ class Space:
         radius of the wall at such an end and zero at others. The volume then has the further term pi [wall w] of the ends.
     on_axis : ndarray of bool, shape (2,)
         Whether each end is on the axis.
+    spreads : bool
+        Whether an end off the axis can move in its plane.
+    free_ends : list of {0, -1}
+        The ends that nothing holds, the first or the last.
     axis_nodes : list of int
         Nodes, counted along the meridian, that are on the axis or the rim of a rigid disc across it.
     hubs : list of {0, -1}
@@ -94,7 +98,7 @@ class Space:
         self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
         self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
-        self.radial = bool((self.R == self.s).all())
+        self.radial = bool((self.s == self.R).all())
         self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
@@ -121,11 +125,17 @@ class Space:
         middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
         self.widest = self.degree * int(np.lexsort((middle, -np.round(radius / radius.max(), 9)))[0])
         self.pin = self.widest if adrift and not self.anchored else None
-        self.wall = None
-        if any(end.wall for end in self.supports):
-            at_ends = np.array([R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)])
-            slope = (at_ends[1] - at_ends[0]) / (self.ends[-1] - self.ends[0])
-            self.wall = at_ends[0] + slope * (self.s - self.ends[0]), np.broadcast_to(slope * self.sizes, self.s.shape)
+        off_axis = [end for end, pole in zip(self.supports, on_axis, strict=False) if not pole]
+        self.spreads = any("u" not in end.held for end in off_axis)
+        self.wall = self._between([R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)])
+        self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
+
+    def _between(self, at_ends: list[float]) -> tuple[Array, Array] | None:
+        """A linear function of the meridian and its slope along the reference element, from values at its ends; None for zeros."""
+        if not any(at_ends):
+            return None
+        slope = (at_ends[1] - at_ends[0]) / (self.ends[-1] - self.ends[0])
+        return at_ends[0] + slope * (self.s - self.ends[0]), np.broadcast_to(slope * self.sizes, self.s.shape)
 
     def _number(self, local: NDArray[np.int64]) -> None:
         free = np.ones((self.n_nodes, 2), dtype=bool)
@@ -205,7 +215,7 @@ class Space:
     @cached_property
     def reference_volume(self) -> float:
         """Volume that the membrane encloses at rest, over R0^3."""
-        density = -self.R**2 * self.Z_x / 2 if self.lids else self.R * self.R_x * self.Z
+        density = -(self.R**2) * self.Z_x / 2 if self.lids else self.R * self.R_x * self.Z
         return float((self.weights * density).sum()) + 0.0
 
     def extend(self, x: Array) -> Array:

@@ -16,8 +16,8 @@ def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:
 def lidded_volume_density(rho: Any, eta_s: Any) -> Any:
     """Integrand over 2 pi of the volume between the membrane and flat lids across its ends, wherever these are.
 
-    By parts 2 pi Int rho rho_s eta ds + pi [-rho^2 eta] = -pi Int rho^2 eta_s ds; a shift along the axis changes nothing of it. The force of
-    the pressure on a lid, pi rho^2 P, acts on the end, along the axis.
+    By parts 2 pi Int rho rho_s eta ds + pi [-rho^2 eta] = -pi Int rho^2 eta_s ds; a shift along the axis changes nothing of it. The force
+    of the pressure on a lid, pi rho^2 P, acts on the end, along the axis.
     """
     return -(rho**2) * eta_s / 2
 

@@ -101,9 +101,9 @@ class Equilibrium:
         Returns
         -------
         dict of ndarray
-            r, rho, eta (over R0; also s, the arc length, where it is not r); stretch_1, stretch_2 (1 meridional, 2 circumferential); mechanical_stress_1, mechanical_stress_2,
-            total_stress_1, total_stress_2 (Cauchy, in units of mu); when the scene has scales, the stresses in Pa as well, under the
-            same names with ``_pa`` at the end.
+            r, rho, eta (over R0; also s, the arc length, where it is not r); stretch_1, stretch_2 (1 meridional, 2 circumferential);
+            mechanical_stress_1, mechanical_stress_2, total_stress_1, total_stress_2 (Cauchy, in units of mu); when the scene has scales,
+            the stresses in Pa as well, under the same names with ``_pa`` at the end.
 
         Raises
         ------

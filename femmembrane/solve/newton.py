@@ -15,6 +15,8 @@ from .controls import ArcLengthControl, Control
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
+#: relative residual above which forces are not in balance, however small the correction of the displacements: that of the pressure may not be
+UNBALANCED = 1e-10
 
 
 @dataclass(slots=True)
@@ -67,7 +69,7 @@ def correct(
         foretold from two corrections in quadratic convergence and confirmed by the residual at x.
     """
     evaluation = potential.evaluate(x, pressure, magnetic)
-    previous, iteration = np.inf, 0
+    previous, iteration, refused = np.inf, 0, False
     while True:
         equations = Equations(potential, control, x, pressure, evaluation)
         if not equations.finite:
@@ -78,7 +80,10 @@ def correct(
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
-            return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
+            result = equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
+            if refused or not done or result.residual <= UNBALANCED or iteration == max_iterations:
+                return result
+            refused = True  # once: on very many elements round-off alone may be above
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)

@@ -25,7 +25,8 @@ from .state import Path, State
 from .stepping import march
 from .wellposed import ill_posed, is_slack
 
-#: a moderately inflated membrane holds this much more than at rest, or that part of it; below, one with sources is reached from here: turning sources on at the flat state starts from a singular Hessian
+#: a moderately inflated membrane holds this much more than at rest, or that part of it. Below, one with sources is reached from there:
+#: turning sources on at the flat state starts from a singular Hessian
 START_VOLUME, START_SHARE = 0.5, 0.12
 #: distance to a source, over R0, below which a start that fails has run into it
 NEAR = 0.2

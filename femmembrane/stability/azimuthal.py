@@ -16,9 +16,9 @@ and the quadratic form is, per reference area,
     + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: magnetic energy density)
 
 with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
-2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. That is for ends that stay in the plane z = 0 or on the axis;
-with lids across the ends, made of horizontal radii where an end is no longer plane, by parts
-- Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c b_x + n b c_x) - n rho_x b c dx. Integrals over theta are normalised as for n = 0, 2 pi
+2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Where an end moves in its plane, the lid that closes the volume
+there counts too: by parts -Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c b_x + n b c_x) - n rho_x b c dx, and at a free edge, whose
+lid is a film that its edge makes harmonic, b (r/rho)^n cos n theta to first order, further [n rho a b] of the two ends. Integrals over theta are normalised as for n = 0, 2 pi
 instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues do not depend on it. c plays no part at n = 0.
 """
 
@@ -281,8 +281,8 @@ def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
     """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
 
     What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
-    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing, and are no perturbations:
-    one node is held against them, which takes none of the others away.
+    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no
+    perturbations: one node is held against them, which takes none of the others away.
     """
     free = np.ones((space.n_nodes, 3), dtype=bool)
     opposite = []
@@ -337,6 +337,12 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
     band = layout.assemble(_density(space, response, pressure, n))
+    for end in space.free_ends if n else ():
+        rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
+        i, j = layout.numbers[space.nodes[end], [_A // 2, _B // 2]]
+        work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
+        for row, column in ((i, j), (j, i)):
+            band[2 * layout.half_bandwidth + row - column, column] += work
     rigid = _rigid_motions(space, layout, response, int(n))
     return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, rigid)
 
@@ -410,7 +416,7 @@ def _density(space: Space, r: LocalResponse, pressure: float, n: int) -> list[Ar
 
 def _volume_density(space: Space, r: LocalResponse, work: Array, n: int) -> dict[tuple[int, int], Array]:
     """Second derivatives of the enclosed volume over 2 pi, times ``work``."""
-    if space.lids:
+    if space.lids and (n == 0 or space.spreads):
         return {
             (_A, _A): -work * r.eta_x,
             (_A, _C): -n * work * r.eta_x,
@@ -482,7 +488,7 @@ class _Spectrum:
             return np.stack([product(column) for column in block.T], axis=1)
 
         for _ in range(iterations):
-            block = np.linalg.qr(solver.solve(times(self.pencil.times_mass)))[0]
+            block = np.linalg.qr(self.pencil.solve(solver, times(self.pencil.times_mass)))[0]
         return np.asarray(block @ eigh(block.T @ times(self._stiffness), block.T @ times(self.pencil.times_mass))[1][:, 0])
 
     def _stiffness(self, x: Array) -> Array:
@@ -499,7 +505,7 @@ class _Spectrum:
         def operator(matvec: Callable[[Array], Array]) -> LinearOperator:
             return LinearOperator((self.n, self.n), matvec=matvec, dtype=float)
 
-        stiffness, mass = (operator(lambda x, product=product: product(x.ravel())) for product in (self._stiffness, self.pencil.times_mass))
+        stiffness, mass = (operator(partial(_flat, product)) for product in (self._stiffness, self.pencil.times_mass))
         start = inverse(np.random.default_rng(0).standard_normal(self.n))
         try:
             values, modes = eigsh(stiffness, k=count, M=mass, sigma=shift, OPinv=operator(inverse), v0=start, ncv=width, tol=1e-12)
@@ -511,6 +517,10 @@ class _Spectrum:
         """With mode . M mode = 1, the largest entry positive."""
         size = np.sqrt(mode @ self.pencil.times_mass(mode))
         return mode / (size * np.sign(mode[np.argmax(np.abs(mode))]))
+
+
+def _flat(product: Callable[[Array], Array], x: Array) -> Array:
+    return product(x.ravel())
 
 
 @one_thread

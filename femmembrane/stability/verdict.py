@@ -100,7 +100,9 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
-    found = smallest_of(pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid), guess)
+    found = smallest_of(
+        pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid), guess
+    )
     held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control]
     return verdict_from(found, f"axisymmetric perturbations {held}", control, 0, partial(mode_shape, potential.space))
 

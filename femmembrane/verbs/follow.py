@@ -24,8 +24,8 @@ from ..solve.state import Path, State
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness
 from ..threads import one_thread
-from .meshing import on_chosen_mesh
 from .arguments import check_height
+from .meshing import on_chosen_mesh
 from .recording import OnStep, record, resume
 from .trace import trace
 
@@ -313,7 +313,9 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
         raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
     scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
-    state = start_at_volume(potential, potential.space.reference_volume + moderate(potential)) if start is None else resume(potential, start)
+    state = (
+        start_at_volume(potential, potential.space.reference_volume + moderate(potential)) if start is None else resume(potential, start)
+    )
     # the amount that holds the state at hand is known: march from it to the wanted one
     held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
     if held <= 0 or state.volume <= -gas.chamber:

@@ -47,8 +47,9 @@ def trace(
     ----------
     scene : Scene
     start : float, Equilibrium or Branch, optional
-        A volume (default that of the moderately inflated membrane: 0.5 more than at rest, or an eighth of that volume), an equilibrium of this scene, or a traced branch to be continued (its points are part of the result, and the new
-        ones are those of an uninterrupted trace to the last bit; it keeps its own direction, step and search for special points).
+        A volume (default that of the moderately inflated membrane: that at rest and 0.5, or an eighth of it), an equilibrium of this scene,
+        or a traced branch to be continued (its points are part of the result, and the new ones are those of an uninterrupted trace to
+        the last bit; it keeps its own direction, step and search for special points).
     until : mapping, optional
         Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it. The
         start itself does not count, and what lies behind it is met, if at all, on a distant part of the branch: see ``direction``.

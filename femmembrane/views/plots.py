@@ -141,7 +141,7 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
 
 
 def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
-    """Taut and wrinkled zones: reference radius (of a curved meridian: arc length) against volume, or against the step where the volume is not monotone.
+    """Taut and wrinkled zones: reference radius (of a curved meridian: arc length) against volume, or the step where that is not monotone.
 
     Parameters
     ----------

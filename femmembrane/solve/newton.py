@@ -16,7 +16,7 @@ TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
 #: relative residual above which forces are not in balance, however small the correction of the displacements: that of the pressure may not be
-UNBALANCED = 1e-10
+UNBALANCED = 1e-9
 
 
 @dataclass(slots=True)

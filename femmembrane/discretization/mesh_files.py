@@ -15,7 +15,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
+from io import StringIO
 from numbers import Real
 from os import PathLike
 from pathlib import Path
@@ -215,7 +217,9 @@ def read_meridian(path: str | PathLike[str], *, divisions: int = 1, first: str =
     if not path.is_file():
         raise InputError("mesh.file", str(path), "there is no such file; the path of a mesh file is allowed (from the folder of the scene)")
     try:
-        mesh = meshio.read(path, file_format=FORMATS[path.suffix.lower()])
+        # what its readers have to say goes into the error
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            mesh = meshio.read(path, file_format=FORMATS[path.suffix.lower()])
     except (Exception, SystemExit) as error:  # its readers raise what they like, and some end the program
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError("mesh.file", str(path), f"cannot be read as a mesh ({reason[:200]})") from None
@@ -316,9 +320,11 @@ def _check_curve(curve: Curve) -> None:
         raise InputError("mesh.points", f"{len(points)} points", "an odd number of points is allowed for curved cells")
     size = np.ptp(points, axis=0).max()
     for k, (R, Z) in enumerate(points):
-        cell = min(k // step, curve._n_cells - 1)
         if not (math.isfinite(R) and math.isfinite(Z)):
+            cell = min(k // step, curve._n_cells - 1)
             raise _refuse(cell, f"cell {cell} has the point ({R:g}, {Z:g}); finite numbers are allowed")
+    for k, (R, Z) in enumerate(points):
+        cell = min(k // step, curve._n_cells - 1)
         if R < 0:
             raise _refuse(cell, f"cell {cell} has the point ({R:g}, {Z:g}); radii >= 0 are allowed")
         inside = 0 < k < len(points) - 1

@@ -191,7 +191,7 @@ class Space:
     @property
     def notes(self) -> tuple[str, ...]:
         """In words, what is done about motions of the membrane as a whole that the supports leave."""
-        R, Z = (float(c[0]) for c in self.mesh.position(self.ends[[self.widest // self.degree]]))
+        R, Z = (round(float(c[0]), 9) + 0.0 for c in self.mesh.position(self.ends[[self.widest // self.degree]]))
         where = f"the circle r = {R:.4g}, z = {Z:.4g}"
         notes = []
         if self.loose:

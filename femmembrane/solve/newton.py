@@ -15,7 +15,7 @@ from .controls import ArcLengthControl, Control
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
-#: relative residual above which forces are not in balance, however small the correction of the displacements: that of the pressure may not be
+#: relative residual above which forces are not in balance, however small the correction of the displacements: the pressure's may be large
 UNBALANCED = 1e-9
 
 

@@ -18,8 +18,10 @@ and the quadratic form is, per reference area,
 with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
 2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Where an end moves in its plane, the lid that closes the volume
 there counts too: by parts -Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c b_x + n b c_x) - n rho_x b c dx, and at a free edge, whose
-lid is a film that its edge makes harmonic, b (r/rho)^n cos n theta to first order, further [n rho a b] of the two ends. Integrals over theta are normalised as for n = 0, 2 pi
-instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues do not depend on it. c plays no part at n = 0.
+lid is a film that its edge makes harmonic, b (r/rho)^n cos n theta to first order, further [n rho a b] of the two ends.
+
+Integrals over theta are normalised as for n = 0, 2 pi instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues
+do not depend on it. c plays no part at n = 0.
 """
 
 from __future__ import annotations

@@ -284,11 +284,18 @@ def _draw_membrane(plotter: pyvista.Plotter, profile: Mapping[str, Array], quant
     }
     # little shading, so that the colours stay those of the scale
     look = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
-    plotter.add_mesh(surface, scalars=quantity, cmap="viridis", scalar_bar_args=bar, **look)
+    plotter.add_mesh(surface, scalars=quantity, cmap="viridis", clim=_color_range(profile[quantity]), scalar_bar_args=bar, **look)
     for node, radius in _drawn_circles(profile["rho"], profile["eta"]):
         tube = pyvista.lines_from_points(points[revolution.node == node], close=True).tube(radius=radius * _extent(profile))
         plotter.add_mesh(tube, color="black", ambient=1.0, diffuse=0.0)
     return [points]
+
+
+def _color_range(values: Array) -> tuple[float, float]:
+    """Ends of a colour scale: those of the values, unless they differ by less than is worth a colour."""
+    low, high = float(np.min(values)), float(np.max(values))
+    spare = max(0.005 * max(abs(low), abs(high)) - (high - low) / 2, 0.0)
+    return low - spare, high + spare
 
 
 def is_closed(rho: Array, eta: Array) -> bool:

@@ -62,13 +62,13 @@ def smallest_eigenvalue(
     SpectrumError
         When neither method yields an eigenvalue with a proof by inertia.
     """
-    if constraint is not None and compliance == 0 and band.shape[1] < 2:
-        raise SpectrumError("one unknown under one constraint leaves nothing to perturb")
     return smallest_of(Pencil(band, mass, half_bandwidth, constraint, compliance), guess)
 
 
 def smallest_of(pencil: Pencil, guess: Array | None = None) -> SmallestEigenvalue:
     """As :func:`smallest_eigenvalue`, of a pencil."""
+    if pencil.constraint is not None and pencil.compliance == 0 and pencil.n < 2:
+        raise SpectrumError("one unknown under one constraint leaves nothing to perturb")
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.proved(start)
     if found is None:

@@ -63,7 +63,10 @@ class Verdict:
 
     @property
     def mode(self) -> Mapping[str, Array] | None:
-        """The shape of the perturbation at the nodes: r (reference radius), u, w, and c around the axis for azimuthal ones."""
+        """The shape of the perturbation at the nodes: r (reference radius), u, w, and c around the axis for azimuthal ones.
+
+        Of a membrane that nothing holds it is known up to a motion of the whole.
+        """
         return None if self._shape is None or self.coefficients is None else self._shape(self.coefficients)
 
     @property

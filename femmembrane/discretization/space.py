@@ -203,14 +203,15 @@ class Space:
             notes.append(f"{moves} across the axis cost no energy: they are left out of verdicts on n = 1")
         return tuple(notes)
 
-    def axis_heights(self, x: Array) -> Array:
+    def axis_heights(self, x: Array) -> list[float]:
         """Heights of the nodes on the axis and of rigid discs across it."""
-        numbers = self.numbers[self.nodes[self.axis_nodes], 1]
-        return self._axis_heights + self.extend(x)[numbers]
+        return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
 
     @cached_property
-    def _axis_heights(self) -> Array:
-        return self.mesh.position(self.node_parameters()[self.axis_nodes])[1]
+    def _axis(self) -> list[tuple[int, float]]:
+        """Unknown and height at rest of each of :attr:`axis_nodes`."""
+        heights = self.mesh.position(self.node_parameters()[self.axis_nodes])[1]
+        return list(zip(self.numbers[self.nodes[self.axis_nodes], 1].tolist(), heights.tolist(), strict=True))
 
     @cached_property
     def reference_volume(self) -> float:

@@ -579,3 +579,43 @@ def test_scene_files(mesh: Any, tmp_path: Any) -> None:
     assert loaded.scene == scene
     assert loaded.notes == branch.notes
     assert np.array_equal(loaded[0].state, branch[0].state)
+
+
+# --- the other verbs
+
+
+def test_error_estimates_are_the_true_errors() -> None:
+    """Of the sphere against its closed form, of the torus against elements of degree 6."""
+    eq = fm.equilibrium(of(fm.sphere(16)), volume=8.0)
+    true = eq.pressure - spherical(NEO_HOOKEAN, (8.0 / BALL) ** (1 / 3))
+    assert eq.error_estimate().pressure.error == pytest.approx(true, rel=0.1)
+    scene = of(fm.torus(3.0, 16))
+    eq = fm.equilibrium(scene, volume=90.0)
+    true = eq.pressure - fm.equilibrium(scene.replace(degree=6), volume=90.0).pressure
+    assert eq.error_estimate().pressure.error == pytest.approx(true, rel=0.1)
+
+
+def test_all_equilibria_of_a_neo_hookean_sphere() -> None:
+    """Two at a pressure below the limit: P = 2 (1/l - 1/l^7) has a small and a large root."""
+    found = fm.equilibria(of(fm.sphere(12), degree=4), pressure=1.0)
+    stretches = [brentq(lambda x: spherical(NEO_HOOKEAN, x) - 1.0, *ends) for ends in ((1.0, 7 ** (1 / 6)), (7 ** (1 / 6), 3.0))]
+    assert sorted(eq.volume for eq in found) == pytest.approx([BALL * s**3 for s in stretches], rel=1e-6)
+    assert [eq.verdict("pressure").stable for eq in found] == [True, False]
+
+
+def test_a_gas_in_a_sphere() -> None:
+    """P + 5 = 60/(V + 1), met on the branch P(V) of the closed form."""
+    gas = fm.Gas(amount=60.0, chamber=1.0, atmosphere=5.0)
+    eq = fm.equilibrium(of(fm.sphere(12), degree=4), gas=gas)
+    volume = brentq(lambda v: spherical(NEO_HOOKEAN, (v / BALL) ** (1 / 3)) - gas.pressure(v), 5.0, 10.0)
+    assert eq.volume == pytest.approx(volume, rel=1e-8)
+    assert eq.verdict("gas").stable
+
+
+def test_the_fold_of_the_sphere_followed_in_the_exponent() -> None:
+    """The limit point of the one-term sphere, l^(3 alpha) = (2 alpha + 3)/(3 - alpha), from alpha = 1 on."""
+    branch = fm.trace(of(fm.sphere(8), one_term(1.0), degree=4), until={"volume": BALL * 3})
+    curve = fm.fold_curve(branch.scene, start=(branch.special_points or ())[0], parameter="material.alpha.0", bounds=(0.8, 2.0))
+    for alpha, volume in zip(curve.values, curve.volume, strict=True):
+        assert volume == pytest.approx(BALL * ((2 * alpha + 3) / (3 - alpha)) ** (1 / alpha), rel=1e-5)
+    assert np.ptp(curve.values) > 0.5

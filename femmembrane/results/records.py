@@ -40,7 +40,7 @@ class Equilibrium:
     volume : float
         Enclosed volume over R0^3, signed, with the 2 pi.
     center_height : float
-        Height of the pole over R0.
+        Height of the pole over R0; of a shape without one that of the first point of its meridian.
     elastic_energy, magnetic_energy : float
         In units of mu T R0^2, with the 2 pi; the magnetic one is 0 without sources.
     residual : float

@@ -45,7 +45,7 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "volume": ("enclosed volume V/R0^3, signed", "1"),
     "pressure": ("pressure P = p R0/(mu T)", "1"),
     "pressure_pa": ("pressure p", "Pa"),
-    "center_height": ("height of the pole over R0", "1"),
+    "center_height": ("height of the pole, or the first point of the meridian, over R0", "1"),
     "elastic_energy": ("elastic energy over mu T R0^2", "1"),
     "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
     "residual": ("out-of-balance force relative to the forces in balance", "1"),

@@ -14,6 +14,20 @@ if TYPE_CHECKING:
     from .accuracy.error_estimate import ErrorEstimate as ErrorEstimate
     from .discretization.meridian import Disc as Disc
     from .discretization.meridian import disc as disc
+    from .discretization.mesh_files import Curve as Curve
+    from .discretization.mesh_files import meridian_from_points as meridian_from_points
+    from .discretization.mesh_files import read_meridian as read_meridian
+    from .discretization.mesh_files import write_meridian as write_meridian
+    from .discretization.shapes import Annulus as Annulus
+    from .discretization.shapes import Cap as Cap
+    from .discretization.shapes import Cylinder as Cylinder
+    from .discretization.shapes import Sphere as Sphere
+    from .discretization.shapes import Torus as Torus
+    from .discretization.shapes import annulus as annulus
+    from .discretization.shapes import cap as cap
+    from .discretization.shapes import cylinder as cylinder
+    from .discretization.shapes import sphere as sphere
+    from .discretization.shapes import torus as torus
     from .errors import FemmembraneError as FemmembraneError
     from .errors import InputError as InputError
     from .errors import SolveError as SolveError
@@ -84,6 +98,11 @@ _ROOMS = {
     "accuracy.convergence": ("Convergence",),
     "accuracy.error_estimate": ("Deviation", "ErrorEstimate"),
     "discretization.meridian": ("Disc", "disc"),
+    "discretization.mesh_files": ("Curve", "meridian_from_points", "read_meridian", "write_meridian"),
+    "discretization.shapes": (
+        *("Annulus", "Cap", "Cylinder", "Sphere", "Torus"),
+        *("annulus", "cap", "cylinder", "sphere", "torus"),
+    ),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.invariant": ("ArrudaBoyce", "Fung", "Gent", "Yeoh"),
     "physics.loads": ("Hydrostatic", "Load", "Weight"),

@@ -4,6 +4,8 @@ Only the terms that the scene has are written down, as one CasADi expression at 
 
     E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS] + [loads],       V = Int rho rho_x eta dx,       both with the 2 pi
 
+(where an end is not held in the plane z = 0, V is closed by flat lids, :mod:`.physics.loads`.)
+
 CasADi differentiates it twice, and the instructions of the result are replayed on whole vectors of points, which costs a small part of
 mapping the scalar function over them. Assembly is a constant linear map of the values at the points (:mod:`.discretization.space`), the
 same for the Newton corrector (NumPy arrays, banded) and for IPOPT (CasADi functions, sparse).
@@ -22,17 +24,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from .discretization.space import HESSIAN_PAIRS, Space, space_of
+from .discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from .errors import InputError
 from .native import native
 from .physics.kinematics import hencky_strains
-from .physics.loads import over_projection, over_reference, volume_density
+from .physics.loads import Load, lidded_volume_density, over_projection, over_reference, volume_density, wall_density
 from .physics.magnetics import Source, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
     from ._native import Elements
-    from .physics.loads import Load
     from .physics.materials import Material
     from .scene import Scene
 
@@ -92,16 +93,26 @@ class Potential:
 
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
-        self.space = space_of(scene.mesh, scene.degree) if quadrature is None else Space(scene.mesh, scene.degree, quadrature)
+        fixed = anchored(scene)
+        self.space = space_of(scene.mesh, scene.degree, fixed) if quadrature is None else Space(scene.mesh, scene.degree, quadrature, fixed)
         space = self.space
         # a source of no strength is none: nothing of it is built
         self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
         self.loads = tuple(load for load in scene.loads if load.acts)
-        self._flat = not (space.Z.any() or space.Z_x.any())
-        columns = [space.R, space.R_x, space.weights] if self._flat else [space.R, space.R_x, space.weights, space.Z, space.Z_x]
-        self.point_data: Array = np.stack([c.ravel() for c in columns])
+        if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
+            advice = (
+                "a liquid fills shapes that are closed by the plane z = 0 or by poles; leave it out, or choose such a shape and supports"
+            )
+            raise InputError("load", self.loads, advice)
+        self.flat = not (space.Z.any() or space.Z_x.any())
+        columns = {"R": space.R, "R_x": space.R_x, "weight": space.weights}
+        if not self.flat:
+            columns |= {"Z": space.Z, "Z_x": space.Z_x}
+        if space.wall is not None:
+            columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
+        self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with _casadi_answers_numpy():
-            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, self._flat)
+            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, tuple(columns), space.lids)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
 
@@ -125,6 +136,16 @@ class Potential:
         """Reference area of the membrane."""
         space = self.space
         return float((space.weights * space.R * np.hypot(space.R_x, space.Z_x)).sum())
+
+    @cached_property
+    def rigid(self) -> Array | None:
+        """Where the membrane can move along the axis as a whole: the mass times that motion, of mass one, shape (n_free, 1)."""
+        space = self.space
+        if space.pin is None:
+            return None
+        density = np.zeros((4, *space.R.shape))
+        density[2] = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        return space.assemble_vector(density.reshape(-1, space.n_elements))[:, None] / np.sqrt(self.area)
 
     @cached_property
     def point_function(self) -> ca.Function:
@@ -220,7 +241,7 @@ class Potential:
         return _Kernel(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
 
     def distance_to_sources(self, x: Array) -> float:
-        """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
+        """Smallest distance of poles, hubs and quadrature points from a source; infinite without sources."""
         if not self.sources:
             return np.inf
         space, elements = self.space, self.elements
@@ -230,28 +251,22 @@ class Potential:
         else:
             elements.at_quadrature(np.ascontiguousarray(x), local)
         u, _, w, _ = local
-        rho, eta = space.R + u, space.Z + w
-        found = min(math.sqrt(s.distance_squared(rho, eta).min()) for s in self.sources)
-        if not self._pole:
-            return found
-        pole = space.center_height(x)
-        return min(found, *(math.sqrt(s.distance_squared(0.0, pole)) for s in self.sources))
+        rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
+        square = [min([s.distance_squared(rho, eta).min(), *(s.distance_squared(0.0, pole) for pole in poles)]) for s in self.sources]
+        return math.sqrt(min(square))
 
     def passed_source(self, before: Array, after: Array) -> bool:
         """Whether the membrane went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
-        heights = self.space.center_height(before), self.space.center_height(after)
-        if self._pole and any(source.passed(*heights) for source in self.sources):
+        if not self.sources:
+            return False
+        heights = zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True)
+        if any(source.passed(*pair) for pair in heights for source in self.sources):
             return True
         circles = [circle for source in self.sources for circle in source.circles]
         if not circles:
             return False
         meridians = [self._meridian(x) for x in (before, after)]
         return any(swept(meridians[0], meridians[1], circle) for circle in circles)
-
-    @property
-    def _pole(self) -> bool:
-        """Whether the meridian begins on the axis."""
-        return abs(float(self.space.mesh.position(self.space.mesh.breakpoints()[:1])[0][0])) < 1e-12
 
     def _meridian(self, x: Array) -> Array:
         """Positions (rho, eta) of the nodes, shape (2, n)."""
@@ -574,13 +589,14 @@ def _potential_of(scene: Scene) -> Potential:
 
 
 def _point_expressions(
-    scene: Scene, sources: Sequence[Source], loads: Sequence[Load], flat: bool
+    scene: Scene, sources: Sequence[Source], loads: Sequence[Load], columns: Sequence[str], lids: bool
 ) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
-    """Symbols (data, local, parameters) and the weighted densities with their gradients at one point."""
-    data = ca.SX.sym("data", 3 if flat else 5)
+    """Symbols (data, local, parameters) and the weighted densities with their gradients at one point; what is no column of data is 0."""
+    data = ca.SX.sym("data", len(columns))
     local = ca.SX.sym("local", 4)
     parameters = ca.SX.sym("parameters", 2)
-    R, R_x, weight, Z, Z_x = (data[k] if k < data.numel() else ca.SX(0) for k in range(5))
+    flat = "Z" not in columns
+    R, R_x, weight, Z, Z_x = (data[columns.index(c)] if c in columns else ca.SX(0) for c in ("R", "R_x", "weight", "Z", "Z_x"))
     u, u_x, w, w_x = (local[k] for k in range(4))
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
@@ -592,7 +608,10 @@ def _point_expressions(
     gradient = area * ca.mtimes(slopes.T, stress)
     bending = sum((stress[k] * ca.jacobian(slopes[k, :].T, local) for k in range(2)), ca.SX(4, 4))
     hessian = area * (ca.mtimes([slopes.T, tangent, slopes]) + bending)
-    volume = weight * volume_density(R + u, R_x + u_x, Z + w)
+    enclosed = lidded_volume_density(R + u, Z_x + w_x) if lids else volume_density(R + u, R_x + u_x, Z + w)
+    if "wall" in columns:
+        enclosed = enclosed + wall_density(data[columns.index("wall")], data[columns.index("wall_x")], w, w_x)
+    volume = weight * enclosed
     magnetic = ca.SX(0)
     if sources and scene.susceptibility:
         magnetic = area * magnetic_energy_density(sources, scene.susceptibility, R + u, Z + w)

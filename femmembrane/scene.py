@@ -8,6 +8,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [[source]]  kind, ...        a class of SOURCES and its arguments
     [[load]]    kind, ...        a class of LOADS and its arguments
     [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
+                file, ...        or a mesh file and what else FILE_KEYS lists; the scene keeps its points
     [effects]                    attributes of Scene that are on or off
     [run]                        Run
     [analysis]                   Analysis
@@ -34,6 +35,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .discretization.meridian import Disc, Meridian, disc
+from .discretization.mesh_files import Curve, read_meridian
+from .discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from .errors import InputError, unknown_name
 from .physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
 from .physics.loads import Hydrostatic, Load, Weight
@@ -62,7 +65,17 @@ SOURCES: dict[str, Any] = {
     "wire": Wire,
 }
 LOADS: dict[str, Any] = {"hydrostatic": Hydrostatic, "weight": Weight}
-SHAPES: dict[str, Any] = {"disc": Disc}
+SHAPES: dict[str, Any] = {
+    "disc": Disc,
+    "annulus": Annulus,
+    "cap": Cap,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "torus": Torus,
+    "curve": Curve,
+}
+#: keys of [mesh] beside the file that holds the meridian
+FILE_KEYS = ("divisions", "first", "last")
 CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
@@ -388,8 +401,14 @@ class Scene:
         return {name: table for name, table in plain.items() if table not in ("", {}, [])}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+    def from_dict(cls, data: Mapping[str, Any], folder: str | PathLike[str] = ".") -> Self:
         """The scene that the tables of a scene file describe.
+
+        Parameters
+        ----------
+        data : mapping
+        folder : path
+            Where the path of a mesh file starts from.
 
         Raises
         ------
@@ -408,7 +427,7 @@ class Scene:
             material=_build_one_of("material", "model", MATERIALS, tables["material"]),
             sources=_build_list("source", SOURCES, data.get("source", ()), scales),
             loads=_build_list("load", LOADS, data.get("load", ())),
-            mesh=_build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **tables["mesh"]}, beside=SCENE_KEYS["mesh"]),
+            mesh=_build_mesh(tables["mesh"], Path(folder)),
             run=_build("run", Run, tables["run"]) if "run" in data else None,
             analysis=_build("analysis", Analysis, tables["analysis"]),
             title=data.get("title", ""),
@@ -425,7 +444,7 @@ class Scene:
         InputError
             When the file cannot be read, is no TOML (with the line), or does not describe a scene.
         """
-        return cls.from_dict(_read_toml(Path(path)))
+        return cls.from_dict(_read_toml(Path(path)), Path(path).parent)
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a scene file that :meth:`from_toml` reads back to an equal scene.
@@ -486,7 +505,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
-    keys["mesh"] |= {"shape"} | arguments(*SHAPES.values())
+    keys["mesh"] |= {"shape", "file"} | arguments(*SHAPES.values())
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
 
 
@@ -521,6 +540,16 @@ def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: 
         raise InputError(f"{path}.{selector}", None, "missing; known: " + ", ".join(sorted(registry)))
     _choice(f"{path}.{selector}", table[selector], registry)
     return _build(path, registry[table[selector]], table, (selector, *beside))
+
+
+def _build_mesh(table: Mapping[str, Any], folder: Path) -> Meridian:
+    if "file" not in table:
+        mesh: Meridian = _build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, beside=SCENE_KEYS["mesh"])
+        return mesh
+    _refuse_unknown("mesh", table, ("file", *FILE_KEYS, *SCENE_KEYS["mesh"]))
+    if not isinstance(table["file"], str):
+        raise InputError("mesh.file", table["file"], "the path of a mesh file is allowed, from the folder of the scene")
+    return read_meridian(folder / table["file"], **{name: table[name] for name in FILE_KEYS if name in table})
 
 
 def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Scales | None = None) -> tuple[Any, ...]:

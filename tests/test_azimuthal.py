@@ -69,6 +69,8 @@ def some_state(scene: fm.Scene, seed: int = 3) -> tuple[Potential, np.ndarray]:
     rng = np.random.default_rng(seed)
     u = s * (1 - s) * (0.8 + 0.3 * rng.standard_normal() * s)
     w = (1 - s**2) * (0.9 + 0.4 * rng.standard_normal() * s**2)
+    if potential.scene.mesh.breakpoints()[-1] > 1:  # on longer meridians that would be no membrane any more
+        u, w = (0.05 * np.sin(s + shift) + 0.1 for shift in rng.standard_normal(2))
     return potential, potential.space.interpolate(u, w)
 
 
@@ -180,7 +182,7 @@ def _surface_energies(potential: Potential, x: np.ndarray, mode: np.ndarray, n: 
     """Elastic and magnetic energy and volume of the surface displaced by ``step`` times the mode, by quadrature around the axis.
 
     The elastic energy is that of the true Cauchy-Green tensor, the magnetic one that of the distance to the axis, the volume the flux
-    of z: nothing is linearised.
+    of z, or with lids of half the distance to the axis, which lids of horizontal radii let none of through: nothing is linearised.
     """
     space = potential.space
     u, u_x, w, w_x = space.at_quadrature(x).reshape(4, *space.R.shape)[..., None]
@@ -201,8 +203,40 @@ def _surface_energies(potential: Potential, x: np.ndarray, mode: np.ndarray, n: 
     weights = space.weights[..., None] / len(angle)
     elastic = potential.material.energy(np.log(mean + radius) / 2, np.log(mean - radius) / 2)
     magnetic = potential.field_energy(np.hypot(rho, theta), z + 0 * theta)[0].reshape(elastic.shape)
-    volume = z * (along[0] * around[1] - along[1] * around[0])
-    return np.array([(weights * R * J * elastic).sum(), (weights * R * J * magnetic).sum(), (weights * volume).sum()])
+    if space.lids and (n == 0 or space.spreads):
+        across = rho * (along[1] * around[2] - along[2] * around[1]) + theta * (along[2] * around[0] - along[0] * around[2])
+        volume = across / 2
+    else:
+        volume = z * (along[0] * around[1] - along[1] * around[0])
+    enclosed = (weights * volume).sum()
+    for end, support in enumerate(space.supports):
+        if not support.held:
+            enclosed += (1 - 2 * end) * _film(*_edge(potential, x, step * mode, n, end, angle))
+    return np.array([(weights * R * J * elastic).sum(), (weights * R * J * magnetic).sum(), enclosed])
+
+
+def _edge(potential: Potential, x: np.ndarray, mode: np.ndarray, n: int, end: int, angle: np.ndarray) -> np.ndarray:
+    """Points (x, y, z) of the displaced edge at an end, each of shape (len(angle),)."""
+    space = potential.space
+    nodal, s = azimuthal_shape(space, n, mode), space.ends[[-end]]
+    (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(x, s)
+    a, c, b = (nodal[k][-end] for k in "ucw")
+    rho, theta = R + u + a * np.cos(n * angle), c * np.sin(n * angle)
+    z = Z + w + b * np.cos(n * angle)
+    return np.array([rho * np.cos(angle) - theta * np.sin(angle), rho * np.sin(angle) + theta * np.cos(angle), z])
+
+
+def _film(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
+    """Volume between the harmonic surface over a closed plane curve with given heights and the one of radii to the axis."""
+    r, phi, m = np.hypot(x, y), np.arctan2(y, x), np.arange((len(x) - 1) // 2)
+    size = r.mean()
+    waves = (r[:, None] / size) ** m * np.cos(m * phi[:, None])
+    # of the symmetric curve, harmonics; their integral over the area is that of r^m cos(m phi)/(m + 2) times x dy - y dx around it
+    coefficients = np.linalg.lstsq(waves, z, rcond=1e-12)[0]
+    k = np.fft.fftfreq(len(x), 1 / len(x))
+    x_t, y_t = (np.fft.ifft(1j * k * np.fft.fft(f)).real for f in (x, y))
+    swept = (x * y_t - y * x_t) * 2 * np.pi / len(x)
+    return float(swept @ (waves @ (coefficients / (m + 2))) - swept @ z / 2)
 
 
 def azimuthal_fields(potential: Potential, mode: np.ndarray, n: int) -> np.ndarray:
@@ -215,12 +249,26 @@ def azimuthal_fields(potential: Potential, mode: np.ndarray, n: int) -> np.ndarr
     return np.stack([table @ vertex @ nodal[k][nodes] for k in "ucw" for table in (value, slope)])
 
 
-@pytest.mark.parametrize("mesh", [fm.disc(elements=6), Cap(), Cap(inner=0.3)], ids=["disc", "cap", "open cap"])
+SURFACES = {
+    "disc": fm.disc(elements=6),
+    "cap": Cap(),
+    "open cap": Cap(inner=0.3),
+    "free annulus": fm.annulus(0.3, elements=6, inner="free", outer="radial"),
+    "annulus with a hub": fm.annulus(0.3, elements=6),
+    "sphere": fm.sphere(elements=6),
+    "tube": fm.cylinder(1.5, elements=6, top="free", bottom="mirror"),
+    "open tube": fm.cylinder(1.5, elements=6, top="free", bottom="free"),
+    "torus": fm.torus(2.5, elements=6),
+}
+
+
+@pytest.mark.parametrize("mesh", SURFACES.values(), ids=SURFACES)
 @pytest.mark.parametrize("n", [0, 1, 2, 5])
 def test_second_differences_of_the_surface_energy(n: int, mesh: Any) -> None:
     """Elastic, magnetic and pressure part of the form, one at a time, against the finite surface; independent of its derivation."""
     potential, x = some_state(disc_scene(dipole=(300, 2.5)).replace(mesh=mesh))
-    bare = potential_of(disc_scene().replace(mesh=mesh))
+    # a source too weak to be felt leaves no motion rigid: the unknowns are the same
+    bare = potential_of(disc_scene(dipole=(1e-40, 2.5)).replace(mesh=mesh))
     size = azimuthal_operator(bare, x, 0.0, n).band.shape[1]
     mode = np.random.default_rng(n).standard_normal(size)
     forms = np.empty(3)
@@ -232,7 +280,7 @@ def test_second_differences_of_the_surface_energy(n: int, mesh: Any) -> None:
     forms[0] = form(bare, 0.0)
     forms[1] = form(potential, 0.0) - forms[0]
     forms[2] = forms[0] - form(bare, 1.0)
-    step = 2e-4
+    step = 1e-4
     e = [_surface_energies(potential, x, mode, n, k * step) for k in (-2, -1, 0, 1, 2)]
     second = (-e[0] + 16 * e[1] - 30 * e[2] + 16 * e[3] - e[4]) / (12 * step**2)
     # integrals over theta are normalised as for n = 0

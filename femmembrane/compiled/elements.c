@@ -336,12 +336,13 @@ typedef struct {
 
 /* Mirror of solve/newton.py, undamped: what each line is for stands there. */
 static int correct(const Elements *s, const Control *control, double *x, double *parameters, double tolerance, double confirmed,
-                   int max_iterations, double *gradients, double *density, Border *b, double *work, Result *r)
+                   double unbalanced, int max_iterations, double *gradients, double *density, Border *b, double *work, Result *r)
 {
     const Py_ssize_t n = s->n_free, np = s->n_points;
     double *force = work, *dx = force + n, *row = dx + n, corner, previous = HUGE_VAL;
     const double *vg = gradients + n, *stiffness = density + N_FORCE * np;
     double p = parameters[0];
+    int refused = 0;
     r->iterations = r->converged = r->factored = 0;
     evaluate(s, x, parameters, r->values, gradients, density);
     for (;;) {
@@ -366,7 +367,9 @@ static int correct(const Elements *s, const Control *control, double *x, double 
             r->converged = done;
             r->correction = size;
             r->residual = relative_residual(s, force, density, p);
-            break;
+            if (refused || !done || r->residual <= unbalanced || r->iterations == max_iterations)
+                break;
+            r->converged = 0, refused = 1;
         }
         for (Py_ssize_t i = 0; i < n; i++)
             x[i] += dx[i];
@@ -551,7 +554,7 @@ static PyObject *elements_assemble(PyObject *self, PyObject *args)
 }
 
 /*
- * correct(control, x, parameters, tolerance, residual, max_iterations, gradients, densities): x is replaced by the solution. Answers
+ * correct(control, x, parameters, tolerance, residual, unbalanced, max_iterations, gradients, densities): x is replaced by the solution. Answers
  * (converged, pressure, elastic, magnetic, volume, iterations, correction, residual, gap, Border or None).
  */
 static PyObject *elements_correct(PyObject *self, PyObject *args)
@@ -561,9 +564,9 @@ static PyObject *elements_correct(PyObject *self, PyObject *args)
     PyObject *asked, *o[4], *answer = NULL;
     Py_buffer x = {0}, p = {0}, g = {0}, d = {0};
     Control control;
-    double tolerance, confirmed;
+    double tolerance, confirmed, unbalanced;
     int most;
-    if (!PyArg_ParseTuple(args, "O!OOddiOO", &PyTuple_Type, &asked, &o[0], &o[1], &tolerance, &confirmed, &most, &o[2], &o[3]))
+    if (!PyArg_ParseTuple(args, "O!OOdddiOO", &PyTuple_Type, &asked, &o[0], &o[1], &tolerance, &confirmed, &unbalanced, &most, &o[2], &o[3]))
         return NULL;
     const int bad = control_init(&control, asked, n) < 0 || take_array(o[0], &x, 'd', n, 1, "x") < 0 ||
                     take_array(o[1], &p, 'd', 2, 1, "parameters") < 0 || take_array(o[2], &g, 'd', 2 * n, 1, "gradients") < 0 ||
@@ -573,7 +576,7 @@ static PyObject *elements_correct(PyObject *self, PyObject *args)
         double *work = malloc(sizeof(double) * 3 * (n + 1));
         BorderObject *border = PyObject_New(BorderObject, types.border);
         const int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0 || work == NULL ||
-                            correct(s, &control, x.buf, p.buf, tolerance, confirmed, most, g.buf, d.buf, &border->border, work, &r) < 0;
+                            correct(s, &control, x.buf, p.buf, tolerance, confirmed, unbalanced, most, g.buf, d.buf, &border->border, work, &r) < 0;
         free(work);
         if (without) {
             PyErr_NoMemory();

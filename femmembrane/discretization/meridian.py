@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..physics.checks import is_number
+from .supports import Support
 
 Array = NDArray[np.float64]
 
@@ -50,13 +51,13 @@ class Meridian(Hashable, Protocol):
         """(dR/ds, dZ/ds) at s."""
 
     def refined(self) -> Self:
-        """The same shape with every element halved."""
+        """The same shape with every element divided in two."""
 
     def with_elements(self, elements: int) -> Self:
         """The same shape, graded alike, with another number of elements."""
 
-    def supports(self) -> tuple[frozenset[str], frozenset[str]]:
-        """Displacements held at the first and last point: subsets of {"u", "w"}."""
+    def supports(self) -> tuple[Support | frozenset[str], Support | frozenset[str]] | tuple[()]:
+        """How the first and last point are held (a plain subset of {"u", "w"} is what a support holds); nothing for a closed curve."""
 
 
 @dataclass(frozen=True)
@@ -100,17 +101,15 @@ class Disc:
         _check_accuracy(self)
         if self.open:
             return
-        ratio = _ratio(self.ratio)
+        ratio = check_ratio(self.ratio, "size at the rim over size at the pole")
         radii = None if self.radii is None else _radii(self.radii)
         follows = ELEMENTS if radii is None else len(radii) - 1
-        elements = follows if self.elements is None else self.elements
-        if isinstance(elements, bool) or not isinstance(elements, (int, np.integer)) or not 1 <= elements <= MAX_ELEMENTS:
-            raise InputError("mesh.elements", elements, f"a whole number >= 1 (and <= {MAX_ELEMENTS}) is allowed")
+        elements = check_elements(follows if self.elements is None else self.elements)
         if radii is not None and elements != follows:
             raise InputError("mesh.elements", elements, f"it contradicts mesh.radii, the ends of {follows}; leave elements out")
         if radii is not None and ratio != 1:
             raise InputError("mesh.ratio", ratio, "not allowed together with mesh.radii, which say all about the sizes; leave one out")
-        for name, value in (("elements", int(elements)), ("ratio", ratio), ("radii", radii)):
+        for name, value in (("elements", elements), ("ratio", ratio), ("radii", radii)):
             object.__setattr__(self, name, value)
 
     @property
@@ -127,11 +126,7 @@ class Disc:
             return np.array([0.0, 1.0])
         if self.radii is not None:
             return np.array(self.radii)
-        if self.ratio == 1 or self.elements == 1:
-            return np.linspace(0.0, 1.0, self.elements + 1)
-        # (q^k - 1)/(q^n - 1) with the quotient q of neighbouring sizes; expm1 keeps the digits of the first, smallest ends
-        growth = np.arange(self.elements + 1) * (math.log(self.ratio) / (self.elements - 1))
-        return np.expm1(growth) / math.expm1(growth[-1])
+        return geometric_ends(self.elements, self.ratio)
 
     def position(self, s: Array) -> tuple[Array, Array]:
         return s, np.zeros_like(s)
@@ -159,11 +154,7 @@ class Disc:
         if self.radii is not None:
             ends = np.interp(np.linspace(0, self.elements, elements + 1), np.arange(self.elements + 1), self.radii)
             return type(self)(radii=tuple(ends))
-        if self.ratio == 1 or self.elements == 1:
-            return type(self)(elements)
-        growth = math.log(self.ratio) * self.elements / (self.elements - 1)
-        ratio = math.exp(growth * (elements - 1) / elements)
-        return type(self)(elements, min(max(ratio, 1 / MAX_RATIO), MAX_RATIO))
+        return type(self)(elements, graded_alike(self.elements, self.ratio, elements))
 
     def supports(self) -> tuple[frozenset[str], frozenset[str]]:
         return frozenset({"u"}), frozenset({"u", "w"})
@@ -204,11 +195,35 @@ def _positive(key: str, value: Any, least: float, most: float, what: str) -> Non
         raise InputError(key, value, f"a number from {least:g} to {most:g} is allowed{what}")
 
 
-def _ratio(value: Any) -> float:
+def check_elements(value: Any, least: int = 1) -> int:
+    """A number of elements, or InputError."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= MAX_ELEMENTS:
+        raise InputError("mesh.elements", value, f"a whole number >= {least} (and <= {MAX_ELEMENTS}) is allowed")
+    return int(value)
+
+
+def check_ratio(value: Any, meaning: str) -> float:
+    """A ratio of sizes, or InputError."""
     if not (is_number(value) and 1 / MAX_RATIO <= float(value) <= MAX_RATIO):
-        allowed = f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed (size at the rim over size at the pole)"
-        raise InputError("mesh.ratio", value, allowed)
+        raise InputError("mesh.ratio", value, f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed ({meaning})")
     return float(value)
+
+
+def geometric_ends(elements: int, ratio: float) -> Array:
+    """Ends of elements on [0, 1] whose sizes follow a geometric progression, the last one ``ratio`` times the first."""
+    if ratio == 1 or elements == 1:
+        return np.linspace(0.0, 1.0, elements + 1)
+    # (q^k - 1)/(q^n - 1) with the quotient q of neighbouring sizes; expm1 keeps the digits of the first, smallest ends
+    growth = np.arange(elements + 1) * (math.log(ratio) / (elements - 1))
+    return np.expm1(growth) / math.expm1(growth[-1])
+
+
+def graded_alike(elements: int, ratio: float, other: int) -> float:
+    """The ratio for another number of elements whose ends are the same function of k/elements."""
+    if ratio == 1 or elements == 1:
+        return 1.0
+    growth = math.log(ratio) * elements / (elements - 1)
+    return min(max(math.exp(growth * (other - 1) / other), 1 / MAX_RATIO), MAX_RATIO)
 
 
 def _radii(values: Any) -> tuple[float, ...]:

@@ -2,7 +2,8 @@
 
 scikit-fem supplies elements, degrees of freedom, quadrature and the map from the reference element; what leaves this module is NumPy
 only. Unknowns are the coefficients of the displacement (u, w), numbered along the meridian and interleaved, so that every matrix of the
-problem is banded with half bandwidth 2 degree + 1. Points are numbered quadrature point first, element second: with arrays of shape
+problem is banded with half bandwidth 2 degree + 1; those of a closed curve are numbered as if it were folded flat, which doubles the
+bandwidth. Points are numbered quadrature point first, element second: with arrays of shape
 (rows * n_quadrature, n_elements) gathering, evaluating and assembling are one matrix product each.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
+from typing import Any, cast
 
 import numpy as np
 import skfem
@@ -19,6 +21,7 @@ from skfem.element import ElementLineP1, ElementLineP2, ElementLinePp
 from skfem.quadrature import get_quadrature
 
 from .meridian import Array, Meridian
+from .supports import as_support, floats, free_rotations
 
 #: pairs (i, j) of the local variables (u, u_x, w, w_x) in the order of Hessian entries
 HESSIAN_PAIRS: tuple[tuple[int, int], ...] = tuple(combinations_with_replacement(range(4), 2))
@@ -30,17 +33,62 @@ _RECOVERED = 3
 class Space:
     """Displacements (u, w) of one degree on one meridian.
 
+    A membrane that nothing holds along the axis is held there at one node, ``pin``: a rigid motion costs no energy, and would leave the
+    equations without a single solution. The forces of that support are zero at an equilibrium.
+
+    Parameters
+    ----------
+    mesh : Meridian
+    degree : int
+    quadrature : int, optional
+        Polynomial degree integrated exactly; default 2 degree + 1.
+    anchored : bool
+        Whether something outside, such as a magnetic source, sees where the membrane is: then no motion is rigid, and nothing is pinned.
+
     Attributes
     ----------
+    closed : bool
+        Whether the last node is the first one.
+    lids : bool
+        Whether flat lids across the ends close the volume; else every end is a pole or in the plane Z = 0, which closes it.
+    wall : (ndarray, ndarray) or None
+        Where an end slides along a wall: a function of the meridian, and its slope along the reference element, that is the squared
+        radius of the wall at such an end and zero at others. The volume then has the further term pi [wall w] of the ends.
+    on_axis : ndarray of bool, shape (2,)
+        Whether each end is on the axis.
+    spreads : bool
+        Whether an end off the axis can move in its plane.
+    free_ends : list of {0, -1}
+        The ends that nothing holds, the first or the last.
+    axis_nodes : list of int
+        Nodes, counted along the meridian, that are on the axis or the rim of a rigid disc across it.
+    hubs : list of {0, -1}
+        The ends that are rims of rigid discs, the first or the last.
+    edges : list of {0, -1}
+        The ends off the axis.
+    nodes : ndarray of int, shape (degree n_elements + 1,)
+        Number of each node in the order of the unknowns, along the meridian.
+    loose : bool
+        Whether something outside alone holds the membrane along the axis.
+    pin : int or None
+        Node held along the axis, counted along the meridian: ``widest`` or none.
+    widest : int
+        Of the ends of elements that of the largest radius, and of these the nearest to the middle.
+    rotations : (bool, bool)
+        Whether a shift across the axis, and a tilt, are rigid motions.
     n_elements, n_quadrature, n_free, half_bandwidth : int
     R, R_x, Z, Z_x : ndarray, shape (n_quadrature, n_elements)
         Reference meridian at the quadrature points; _x is the derivative along the reference element [0, 1].
+    radial : bool
+        Whether the parameter of the meridian is its radius.
+    lengths : ndarray, shape (n_elements,)
+        Arc length of each element at rest.
     weights : ndarray, shape (n_quadrature, n_elements)
         2 pi times the quadrature weight on the reference element.
     """
 
-    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None) -> None:
-        self.mesh, self.degree = mesh, degree
+    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: bool = False) -> None:
+        self.mesh, self.degree, self.anchored = mesh, degree, anchored
         self.ends: Array = mesh.breakpoints()
         self.sizes: Array = np.diff(self.ends)
         line = skfem.MeshLine(self.ends)
@@ -52,24 +100,61 @@ class Space:
         self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
         self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.radial = bool((self.s == self.R).all())
+        self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
-        self._number(local, n_nodes)
+        self._support(n_nodes)
+        self._number(self.nodes[local])
         self._tabulate(points)
 
-    def _number(self, local: NDArray[np.int64], n_nodes: int) -> None:
-        free = np.ones((n_nodes, 2), dtype=bool)
-        for node, held in zip((0, n_nodes - 1), self.mesh.supports(), strict=True):
-            free[node] &= ["u" not in held, "w" not in held]
+    def _support(self, n_nodes: int) -> None:
+        """What holds the ends, what closes the volume there, and what is done about rigid motions."""
+        self.supports = tuple(as_support(held) for held in self.mesh.supports())
+        self.closed = not self.supports
+        R, Z = self.mesh.position(self.ends[[0, -1]])
+        self.on_axis = on_axis = np.abs(R) < 1e-12
+        self.axis_nodes = [] if self.closed else [k * (n_nodes - 1) for k in (0, 1) if on_axis[k] or self.supports[k].rigid]
+        self.hubs = [-k for k, support in enumerate(self.supports) if support.rigid]
+        self.edges = [-k for k, _ in enumerate(self.supports) if not on_axis[k]]
+        self.nodes: NDArray[np.int64] = _folded(n_nodes) if self.closed else np.arange(n_nodes)
+        self.n_nodes = n_nodes - int(self.closed)
+        adrift = floats(self.supports)
+        in_plane = [pole or ("w" in end.held and height == 0) for pole, end, height in zip(on_axis, self.supports, Z, strict=False)]
+        self.loose = adrift and self.anchored
+        self.lids = adrift or not all(in_plane)
+        self.rotations = (False, False) if self.anchored else free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
+        radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
+        middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
+        self.widest = self.degree * int(np.lexsort((middle, -np.round(radius / radius.max(), 9)))[0])
+        self.pin = self.widest if adrift and not self.anchored else None
+        off_axis = [end for end, pole in zip(self.supports, on_axis, strict=False) if not pole]
+        self.spreads = any("u" not in end.held for end in off_axis)
+        self.wall = self._between([R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)])
+        self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
+
+    def _between(self, at_ends: list[float]) -> tuple[Array, Array] | None:
+        """A linear function of the meridian and its slope along the reference element, from values at its ends; None for zeros."""
+        if not any(at_ends):
+            return None
+        slope = (at_ends[1] - at_ends[0]) / (self.ends[-1] - self.ends[0])
+        return at_ends[0] + slope * (self.s - self.ends[0]), np.broadcast_to(slope * self.sizes, self.s.shape)
+
+    def _number(self, local: NDArray[np.int64]) -> None:
+        free = np.ones((self.n_nodes, 2), dtype=bool)
+        for node, support in zip(self.nodes[[0, -1]], self.supports, strict=False):
+            free[node] &= ["u" not in support.held, "w" not in support.held]
+        if self.pin is not None:
+            free[self.nodes[self.pin], 1] = False
         self.n_free = int(free.sum())
         # one spare slot past the end stands for all that is held at zero
-        numbers: NDArray[np.int64] = np.full((n_nodes, 2), self.n_free, dtype=np.int64)
+        numbers: NDArray[np.int64] = np.full((self.n_nodes, 2), self.n_free, dtype=np.int64)
         numbers[free] = np.arange(self.n_free)
         self.numbers = numbers
         self.gather = np.concatenate([numbers[local, 0], numbers[local, 1]])
-        self.half_bandwidth = min(2 * self.degree + 1, max(self.n_free - 1, 0))
+        self.half_bandwidth = band_of(self.gather, self.n_free) if self.closed else min(2 * self.degree + 1, max(self.n_free - 1, 0))
         self.fields = tuple(_as_slice(np.sort(column[column < self.n_free])) for column in numbers.T)
-        self.pole = int(numbers[0, 1])
+        self.pole = int(numbers[self.nodes[0], 1])
         self.first_height = float(self.mesh.position(self.ends[:1])[1][0])
 
     def _tabulate(self, points: Array) -> None:
@@ -105,6 +190,37 @@ class Space:
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
         return float(self.first_height + (x[self.pole] if self.pole < self.n_free else 0.0))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """In words, what is done about motions of the membrane as a whole that the supports leave."""
+        R, Z = (round(float(c[0]), 9) + 0.0 for c in self.mesh.position(self.ends[[self.widest // self.degree]]))
+        where = f"the circle r = {R:.4g}, z = {Z:.4g}"
+        notes = []
+        if self.loose:
+            notes.append("nothing but the sources holds the membrane along the axis")
+        if self.pin is not None:
+            notes.append(f"nothing holds the membrane along the axis: {where} is kept at its height, without any force")
+        if any(self.rotations):
+            moves = " and ".join(name for name, free in zip(("shifts", "tilts"), self.rotations, strict=True) if free)
+            notes.append(f"{moves} across the axis cost no energy: they are left out of verdicts on n = 1")
+        return tuple(notes)
+
+    def axis_heights(self, x: Array) -> list[float]:
+        """Heights of the nodes on the axis and of rigid discs across it."""
+        return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
+
+    @cached_property
+    def _axis(self) -> list[tuple[int, float]]:
+        """Unknown and height at rest of each of :attr:`axis_nodes`."""
+        heights = self.mesh.position(self.node_parameters()[self.axis_nodes])[1]
+        return list(zip(self.numbers[self.nodes[self.axis_nodes], 1].tolist(), heights.tolist(), strict=True))
+
+    @cached_property
+    def reference_volume(self) -> float:
+        """Volume that the membrane encloses at rest, over R0^3."""
+        density = -(self.R**2) * self.Z_x / 2 if self.lids else self.R * self.R_x * self.Z
+        return float((self.weights * density).sum()) + 0.0
 
     def extend(self, x: Array) -> Array:
         """Free coefficients with the zero of the supports appended, so that ``extend(x)[numbers]`` covers all nodes."""
@@ -183,11 +299,21 @@ class Space:
         return self.assemble_band(density.reshape(-1, self.n_elements))
 
     def interpolate(self, u: Array, w: Array) -> Array:
-        """Free coefficients of the interpolant of displacements given at :meth:`interpolation_points`, both of that shape."""
+        """Free coefficients of the interpolant of displacements given at :meth:`interpolation_points`, both of that shape.
+
+        Where the membrane is pinned along the axis, less the rigid motion that takes the pin away from its place.
+        """
         inverse = self._from_values
         x = np.zeros(self.n_free + 1)
+        if self.pin is not None:
+            w = w - self._at_pin(w)
         x[self.gather] = np.concatenate([inverse @ u, inverse @ w])
         return x[: self.n_free]
+
+    def _at_pin(self, w: Array) -> float:
+        """What the interpolant of values at the interpolation points is at the node that is held along the axis."""
+        element = cast(int, self.pin) // self.degree
+        return float(w[0, element] if element < self.n_elements else w[-1, -1])
 
     @cached_property
     def _from_values(self) -> Array:
@@ -258,9 +384,34 @@ class Space:
 
 
 @lru_cache(maxsize=32)
-def space_of(mesh: Meridian, degree: int) -> Space:
+def space_of(mesh: Meridian, degree: int, anchored: bool = False) -> Space:
     """The space of a mesh and a degree, built once."""
-    return Space(mesh, degree)
+    return Space(mesh, degree, anchored=anchored)
+
+
+def space_of_scene(scene: Any) -> Space:
+    """The space of a scene, built once."""
+    return space_of(scene.mesh, scene.degree, anchored(scene))
+
+
+def anchored(scene: Any) -> bool:
+    """Whether something outside the membrane of a scene sees where it is: a source or load, unless it does nothing."""
+    magnetic = bool(scene.susceptibility) and any(getattr(source, "strength", 1.0) != 0 for source in scene.sources)
+    return magnetic or any(load.acts for load in scene.loads)
+
+
+def band_of(gather: NDArray[np.int64], n_free: int) -> int:
+    """Half bandwidth that the unknowns of the elements, one column each, leave; those numbered ``n_free`` are none."""
+    inside = gather < n_free
+    low, high = np.where(inside, gather, n_free).min(axis=0), np.where(inside, gather, -1).max(axis=0)
+    return int((high - low).max(initial=0))
+
+
+def _folded(n_nodes: int) -> NDArray[np.int64]:
+    """Numbers of the nodes of a closed curve, the last one the first again, so that neighbours differ by two at most."""
+    k = np.arange(n_nodes)
+    n = n_nodes - 1
+    return np.where(2 * k <= n, np.maximum(2 * k - 1, 0), 2 * (n - k))
 
 
 def _sum_by(index: NDArray[np.int64], values: Array, length: int) -> Array:

@@ -154,6 +154,7 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
         "scene": branch.scene.to_dict(),
         "command": command if command is None or isinstance(command, str) else list(command),
         **({"mesh": branch.mesh_used} if branch.mesh_used else {}),
+        **({"notes": list(branch.notes)} if branch.notes else {}),
         "status": branch.status.value,
         "message": branch.message,
         "equilibria": len(branch),

@@ -40,7 +40,7 @@ class Equilibrium:
     volume : float
         Enclosed volume over R0^3, signed, with the 2 pi.
     center_height : float
-        Height of the pole over R0.
+        Height of the pole over R0; of a shape without one that of the first point of its meridian.
     elastic_energy, magnetic_energy : float
         In units of mu T R0^2, with the 2 pi; the magnetic one is 0 without sources.
     residual : float
@@ -98,14 +98,15 @@ class Equilibrium:
         Parameters
         ----------
         r : array_like, optional
-            Reference radii in [0, 1]; default the nodes, from the pole to the rim.
+            Reference radii in [0, 1]; of a meridian that does not run along the radius, arc lengths over R0 from its first end. Default
+            the nodes, from the pole to the rim (from the first to the last end).
 
         Returns
         -------
         dict of ndarray
-            r, rho, eta (over R0); stretch_1, stretch_2 (1 meridional, 2 circumferential); mechanical_stress_1, mechanical_stress_2,
-            total_stress_1, total_stress_2 (Cauchy, in units of mu); when the scene has scales, the stresses in Pa as well, under the
-            same names with ``_pa`` at the end.
+            r, rho, eta (over R0; also s, the arc length, where it is not r); stretch_1, stretch_2 (1 meridional, 2 circumferential);
+            mechanical_stress_1, mechanical_stress_2, total_stress_1, total_stress_2 (Cauchy, in units of mu); when the scene has scales,
+            the stresses in Pa as well, under the same names with ``_pa`` at the end.
 
         Raises
         ------
@@ -115,7 +116,7 @@ class Equilibrium:
         from ..stability.profile import profile_at
 
         space = self.potential.space
-        s = space.node_parameters() if r is None else _radii(r, space.mesh.breakpoints())
+        s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
         return profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
@@ -408,7 +409,7 @@ class Branch(Sequence[Equilibrium]):
             numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
             words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
             lines.append(numbers + words + (f"  {eq.zones().summary}" if zones else ""))
-        lines += [line for line in (self.mesh_used, self.message) if line]
+        lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)
 
     @property
@@ -419,6 +420,13 @@ class Branch(Sequence[Equilibrium]):
         if accuracy is None or estimated is None:
             return ""
         return f"mesh: {mesh.elements} elements of degree {degree}, graded, chosen for accuracy {accuracy:g}, estimated {estimated:.0e}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done about motions of the membrane as a whole that nothing resists; nothing for one that is held."""
+        from ..discretization.space import space_of_scene
+
+        return () if self.scene.open else space_of_scene(self.scene).notes
 
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""
@@ -469,8 +477,8 @@ class Branch(Sequence[Equilibrium]):
         return branch_html(self)
 
 
-def _radii(r: ArrayLike, ends: Array) -> Array:
+def _places(r: ArrayLike, ends: Array, what: str) -> Array:
     s = np.atleast_1d(np.asarray(r, dtype=float))
     if not ((s >= ends[0]) & (s <= ends[-1])).all():
-        raise InputError("r", r, f"reference radii in [{ends[0]:g}, {ends[-1]:g}] are allowed")
+        raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
     return s

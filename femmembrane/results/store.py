@@ -46,7 +46,7 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "volume": ("enclosed volume V/R0^3, signed", "1"),
     "pressure": ("pressure P = p R0/(mu T)", "1"),
     "pressure_pa": ("pressure p", "Pa"),
-    "center_height": ("height of the pole over R0", "1"),
+    "center_height": ("height of the pole, or the first point of the meridian, over R0", "1"),
     "elastic_energy": ("elastic energy over mu T R0^2", "1"),
     "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
     "load_energy": ("energy of the loads over mu T R0^2", "1"),
@@ -56,6 +56,7 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "status": ("how the solve ended", "1"),
     "state": ("displacement coefficients over R0 on the free degrees of freedom", "1"),
     "r": ("reference radius of the node over R0", "1"),
+    "s": ("arc length of the reference meridian from its first end to the node, over R0", "1"),
     "rho": ("deformed radius over R0", "1"),
     "eta": ("deformed height over R0", "1"),
     "stretch_1": ("meridional stretch", "1"),
@@ -157,7 +158,7 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
         variables["trace_point"] = ("trace", "unknown"), branch.memory.points
         variables["trace_slope"] = ("trace", "unknown"), branch.memory.slopes
     described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
-    coordinates = {name: described.pop(name) for name in ("step", "r", "estimated") if name in described}
+    coordinates = {name: described.pop(name) for name in ("step", "r", "s", "estimated") if name in described}
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
 
 
@@ -241,8 +242,9 @@ def _profile_variables(branch: Branch) -> dict[str, _Variable]:
     profiles = [e.profile() for e in branch]
     if not profiles:
         return {}
-    values = {key: (("step", "node"), np.array([p[key] for p in profiles])) for key in profiles[0] if key != "r"}
-    return {"r": (("node",), np.array(profiles[0]["r"])), **values}
+    places = [key for key in ("r", "s") if key in profiles[0]]
+    values = {key: (("step", "node"), np.array([p[key] for p in profiles])) for key in profiles[0] if key not in places}
+    return {**{key: (("node",), np.array(profiles[0][key])) for key in places}, **values}
 
 
 def _asked(scene: Scene) -> list[tuple[str, str | None, int]]:

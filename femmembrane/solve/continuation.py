@@ -57,7 +57,8 @@ class BranchPoint:
             return self.tangent_pressure
         if quantity == "volume":
             return float(self.state.evaluation.volume_gradient @ self.tangent)
-        return float(self.tangent[potential.space.pole])
+        pole = potential.space.pole
+        return float(self.tangent[pole]) if pole < self.tangent.size else 0.0
 
 
 @dataclass(slots=True)

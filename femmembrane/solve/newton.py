@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
+#: relative residual above which forces are not in balance, however small the correction of the displacements: the pressure's may be large
+UNBALANCED = 1e-9
 
 
 @dataclass(slots=True)
@@ -74,7 +76,7 @@ def correct(
     if elements is not None:
         return _compiled(elements, potential, control, x, pressure, magnetic, tolerance, max_iterations)
     evaluation = potential.evaluate(x, pressure, magnetic)
-    previous, iteration = np.inf, 0
+    previous, iteration, refused = np.inf, 0, False
     while True:
         equations = Equations(potential, control, x, pressure, evaluation)
         if not equations.finite:
@@ -85,7 +87,10 @@ def correct(
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
-            return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
+            result = equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
+            if refused or not done or result.residual <= UNBALANCED or iteration == max_iterations:
+                return result
+            refused = True  # once: on very many elements round-off alone may be above
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
@@ -115,7 +120,7 @@ def _compiled(
     x, parameters = x.copy(), np.array([pressure, magnetic], dtype=float)
     numbers = control.numbers(potential.space)
     converged, pressure, elastic, field_energy, volume, iterations, correction, residual, gap, border = elements.correct(
-        numbers, x, parameters, tolerance, RESIDUAL, max_iterations, gradients, densities
+        numbers, x, parameters, tolerance, RESIDUAL, UNBALANCED, max_iterations, gradients, densities
     )
     evaluation = potential.evaluation(x, (elastic, field_energy, volume), gradients, densities, magnetic)
     bordered = None if border is None else CompiledBorder(border)

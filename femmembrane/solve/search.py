@@ -14,11 +14,12 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment
-from .start import spherical_dome, start_at_volume
-from .state import Path, State, distance, flat_state, rests_flat
+from .start import START_VOLUME, guess_at_volume, moderate, start_at_volume
+from .state import Path, State, at_rest, distance, flat_state
 from .wellposed import ill_posed, is_slack
 
-#: volumes of the domes from which branches and deflated iterations set out
+#: volumes of the domes from which branches and deflated iterations set out; from other shapes than flat ones: beyond that at rest, in
+#: proportion to that of a moderately inflated membrane
 STARTS = (0.5, -0.5, 5.0, -5.0, 50.0, -50.0)
 #: two states closer than this are the same, relative to the size of the displacement
 SAME = 1e-6
@@ -43,11 +44,16 @@ class Search:
     ill_posed: list[State] = field(default_factory=list)
     _points: list[BranchPoint] = field(default_factory=list)
 
+    @property
+    def starts(self) -> list[float]:
+        """Volumes of the starts."""
+        return [self.potential.space.reference_volume + v * moderate(self.potential) / START_VOLUME for v in STARTS]
+
     def run(self) -> None:
         """Trace the branches through the starts, then deflate until nothing new appears."""
-        if self.load == 0 and rests_flat(self.potential):
+        if at_rest(self.potential, self.quantity, self.load):
             self._add(flat_state(self.potential))
-        for volume in STARTS:
+        for volume in self.starts:
             try:
                 state = start_at_volume(self.potential, volume)
             except SolveError:
@@ -99,7 +105,7 @@ class Search:
     def _deflated(self) -> State | None:
         """A state not found yet, by Newton's method with the known ones deflated (Farrell, Birkisson and Funke, 2015)."""
         control = CONTROLS[self.quantity](self.load)
-        guesses = [(spherical_dome(self.potential, v), 0.0 if self.quantity == "volume" else self.load) for v in STARTS]
+        guesses = [(guess_at_volume(self.potential, v), 0.0 if self.quantity == "volume" else self.load) for v in self.starts]
         guesses += [(scale * s.x, s.pressure) for s in self.states for scale in (0.7, 1.3, -1.0)]
         for x, pressure in guesses:
             self.deflations += 1

@@ -177,7 +177,10 @@ def branch_point(segment: Segment) -> Located | None:
         return None
     while high - low > 1e-9:
         middle = (low + high) / 2
-        sign = _bordered_sign(segment.at(middle))
+        try:
+            sign = _bordered_sign(segment.at(middle))
+        except SolveError:  # next to the crossing the equations are all but singular: what is known is the bracket
+            break
         low, high = (middle, high) if sign == signs[0] else (low, middle)
     return Located("branch_point", segment.at(low), (high - low) * segment.length)
 

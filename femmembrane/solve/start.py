@@ -1,7 +1,9 @@
 """Cold starts: an equilibrium at a volume without a neighbour to start from.
 
 The order of loading is fixed, so that the answer is one state and not an accident of the optimiser: the membrane is inflated without
-its sources and loads first, then their energy is turned on at constant volume.
+its sources and loads first, then their energy is turned on at constant volume. A membrane has no bending stiffness, so that at rest nothing
+holds its shape: it is inflated at once, from a guess that encloses the volume, a dome over a disc, the reference shape shifted along its
+normal else.
 """
 
 from __future__ import annotations
@@ -11,27 +13,75 @@ from contextlib import suppress
 
 import numpy as np
 
+from ..discretization.meridian import Disc
+from ..discretization.space import Space
 from ..errors import SolveError, Status
-from ..potential import Array, Potential
+from ..potential import Array, Potential, potential_of
 from .banded import negative_directions
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
 from .controls import CenterHeightControl, VolumeControl
+from .finer import transferred
+from .minimize import minimize
 from .newton import correct
 from .special_points import Segment
-from .state import Path, State, flat_state, rests_flat
+from .state import Path, State, at_rest, flat_state
 from .stepping import march
 from .wellposed import ill_posed, is_slack
 
-#: below this volume a membrane with sources is reached from here: turning sources on at the flat state starts from a singular Hessian
-START_VOLUME = 0.5
+#: a moderately inflated membrane holds this much more than at rest, or that part of it. Below, one with sources is reached from there:
+#: turning sources on at the flat state starts from a singular Hessian
+START_VOLUME, START_SHARE = 0.5, 0.12
 #: volume below which an equilibrium is looked for from the nearly flat side
 NEARLY_FLAT = 0.05
 #: distance to a source, over R0, below which a start that fails has run into it
 NEAR = 0.2
-#: from this volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
-SAFE_VOLUME = 10.0
-#: up to this volume every membrane is a dome to which linear elasticity applies: a dome that fails there is not tried smaller
-SMALL_VOLUME = 0.05
+#: from this many times that volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
+SAFE = 20.0
+#: up to this part of it every membrane is one to which linear elasticity applies: a guess that fails there is not tried smaller
+SMALL = 0.1
+#: the guess falls off to a support within this arc length
+_EDGE = 1.5
+
+
+def moderate(potential: Potential) -> float:
+    """By how much the volume of a moderately inflated membrane differs from that at rest."""
+    return max(START_VOLUME, START_SHARE * abs(potential.space.reference_volume))
+
+
+def guess_at_volume(potential: Potential, volume: float) -> Array:
+    """Coefficients of a smooth shape that respects the supports and encloses a volume."""
+    if isinstance(potential.space.mesh, Disc):
+        return spherical_dome(potential, volume)
+    direction = _normal(potential.space)
+    amplitudes = np.array([-1.0, 0.0, 1.0, 2.0])
+    # the volume is a cubic in the amplitude: so through four values exactly
+    volumes = np.array([potential.evaluate(a * direction, 0.0).volume for a in amplitudes])
+    cubic = np.linalg.solve(np.vander(amplitudes), volumes)
+    cubic[np.abs(cubic) < 1e-14 * np.abs(cubic).max()] = 0.0
+    cubic[-1] = potential.space.reference_volume - volume
+    roots = np.roots(cubic)
+    real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots))].real
+    return float(real[np.argmin(np.abs(real))]) * direction if real.size else direction
+
+
+def _normal(space: Space) -> Array:
+    """Coefficients of the unit normal of the reference meridian, falling off to ends that hold a component of it."""
+    s = space.interpolation_points()
+    R_s, Z_s = space.mesh.tangent(s)
+    J = np.hypot(R_s, Z_s)
+    n_u, n_w = -Z_s / J, R_s / J
+    length = np.concatenate([[0.0], np.cumsum(space.lengths)])
+    along = length[:-1] + (s - space.ends[:-1]) / space.sizes * space.lengths
+    held = [
+        ("u" in support.held and abs(n_u[place]) > 1e-9) or ("w" in support.held and abs(n_w[place]) > 1e-9)
+        for support, place in zip(space.supports, ((0, 0), (-1, -1)), strict=False)
+    ]
+    edge = min(_EDGE, length[-1] / max(sum(held), 1))
+    factor = np.ones_like(s)
+    for is_held, distance_ in zip(held, (along, length[-1] - along), strict=False):
+        if is_held:
+            factor = factor * (1 - (1 - np.minimum(1.0, distance_ / edge)) ** 2)
+    return space.interpolate(factor * n_u, factor * n_w)
 
 
 def spherical_dome(potential: Potential, volume: float) -> Array:
@@ -66,19 +116,21 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     SolveError
         When the path ends before the full strength of the sources, or a dome cannot be inflated to the volume.
     """
-    magnetic = potential.surrounded
-    if volume == 0 and rests_flat(potential):
+    surrounded, rest = potential.surrounded, potential.space.reference_volume
+    if at_rest(potential, "volume", volume):
         return flat_state(potential)
+    if surrounded and potential.space.loose:
+        return _from_unanchored(potential, volume)
     failure = None
-    if magnetic and abs(volume) < START_VOLUME:
+    if surrounded and abs(volume - rest) < moderate(potential):
         try:
             return _from_either_side(volume, lambda first, state: march(potential, state, VolumeControl, first, volume)[-1], potential)
         except SolveError as error:
-            if volume == 0:  # nowhere to turn the sources on but at the flat state itself
+            if volume == rest:  # nowhere to turn the sources on but at the flat state itself
                 raise
             failure = error
     state = _inflated(potential, volume)
-    if not magnetic:
+    if not surrounded:
         return state
     try:
         return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1]
@@ -93,20 +145,40 @@ def start_at_volume(potential: Potential, volume: float) -> State:
         ) from error
 
 
+def _from_unanchored(potential: Potential, volume: float) -> State:
+    """As :func:`start_at_volume` where nothing but the sources holds the membrane in its place: these are turned on at once."""
+    bare = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
+    state = _inflated(bare, volume)
+    guess = transferred(bare.space, state.x, potential.space)
+    result = correct(potential, VolumeControl(volume), guess, state.pressure, damped=True, max_iterations=40)
+    if result.status is not Status.CONVERGED:
+        raise SolveError(
+            f"no place was found in which the sources hold the membrane at V = {volume:.6g}; nothing else holds it along the axis",
+            status=Status.NO_EQUILIBRIUM,
+        )
+    return State.of(result)
+
+
 def _inflated(potential: Potential, volume: float) -> State:
     """Equilibrium without sources."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a dome may be too large or small for its energy to be a number: not converged
-        dome = spherical_dome(potential, volume)
-        result = correct(potential, VolumeControl(volume), dome, 0.0, magnetic=0.0, damped=True, max_iterations=40)
+    with np.errstate(over="ignore", invalid="ignore"):  # a guess may be too large or small for its energy to be a number: not converged
+        guess = guess_at_volume(potential, volume)
+        result = correct(potential, VolumeControl(volume), guess, 0.0, magnetic=0.0, damped=True, max_iterations=40)
+    if result.status is not Status.CONVERGED and not isinstance(potential.space.mesh, Disc):  # a minimiser goes downhill from farther away
+        found, p, _, _ = minimize(potential, VolumeControl(volume), guess, 0.0, magnetic=0.0)
+        if np.isfinite(found).all() and np.isfinite(p):
+            result = correct(potential, VolumeControl(volume), found, p, magnetic=0.0)
     if result.status is Status.CONVERGED:
         return State.of(result)
     bad = ill_posed(potential, result.evaluation)
     if bad is not None and bad.slack:
         raise SolveError(f"no tension holds a dome of volume {volume:.6g}: {bad}", status=Status.SLACK)
-    if abs(volume) <= SMALL_VOLUME:
+    rest, size = potential.space.reference_volume, moderate(potential)
+    excess = abs(volume - rest)
+    if excess <= SMALL * size:
         raise SolveError(f"no dome of volume {volume:.6g} could be inflated; {result.status.advice}", status=result.status)
-    # a dome may be far from the equilibrium, or, where a material locks, outside the domain of its energy
-    first = np.copysign(SAFE_VOLUME if abs(volume) > SAFE_VOLUME else abs(volume) / 4, volume)
+    # a guess may be far from the equilibrium, or, where a material locks, outside the domain of its energy
+    first = rest + np.copysign(SAFE * size if excess > SAFE * size else excess / 4, volume - rest)
     return march(potential, _inflated(potential, first), VolumeControl, first, volume, magnetic=0.0)[-1]
 
 
@@ -122,18 +194,20 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
     SolveError
         With status NO_EQUILIBRIUM when neither direction crosses the pressure in a minimum.
     """
-    if pressure == 0 and rests_flat(potential):
+    if at_rest(potential, "pressure", pressure):
         return flat_state(potential)
-    # a nearly flat membrane obeys P = 3.34 V^3 without sources, and its mirror image carries the opposite pressure; weak sources add to it
-    load = pressure + _pull(potential)
-    size = (abs(load) / 4) ** (1 / 3)
-    if potential.surrounded and size > NEARLY_FLAT:
-        size, load = START_VOLUME, pressure
-    volume = float(np.copysign(min(size, START_VOLUME), load))
+    size, rest, load = moderate(potential), potential.space.reference_volume, pressure
+    if potential.flat:
+        # a nearly flat membrane obeys P = 3.34 V^3 without sources, and its mirror image carries the opposite pressure; weak ones add to it
+        lifted = pressure + _pull(potential)
+        nearly = (abs(lifted) / 4) ** (1 / 3)
+        if not potential.surrounded or nearly <= NEARLY_FLAT:
+            size, load = min(size, nearly), lifted
+    volume, other = (rest + float(np.copysign(size, side * load)) for side in (1, -1))
     found = _through(potential, start_at_volume(potential, volume), pressure)
     if found is None and potential.surrounded:
         with suppress(SolveError):  # the failure on this side of the flat membrane is the one to report
-            found = _through(potential, start_at_volume(potential, -volume), pressure)
+            found = _through(potential, start_at_volume(potential, other), pressure)
     if found is not None:
         return found
     raise SolveError(
@@ -153,7 +227,7 @@ def _through(potential: Potential, state: State, pressure: float) -> State | Non
 
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
-    if height == 0 and rests_flat(potential):
+    if at_rest(potential, "height", height):
         return flat_state(potential)
 
     def follow(_: float, state: State) -> State:
@@ -168,12 +242,12 @@ def _from_either_side(load: float, follow: Callable[[float, State], State], pote
 
     The side of the load comes first, so that a mirrored scene takes the mirrored path.
     """
-    side = float(np.copysign(START_VOLUME, load))
+    rest, side = potential.space.reference_volume, float(np.copysign(moderate(potential), load))
     try:
-        return follow(side, start_at_volume(potential, side))
+        return follow(rest + side, start_at_volume(potential, rest + side))
     except SolveError as failure:
         try:
-            return follow(-side, start_at_volume(potential, -side))
+            return follow(rest - side, start_at_volume(potential, rest - side))
         except SolveError:
             raise failure from None
 
@@ -183,7 +257,7 @@ def _pull(potential: Potential) -> float:
     if not potential.surrounded:
         return 0.0
     flat, across = np.zeros(potential.space.n_free), potential.space.fields[1]
-    evaluation, dome = potential.evaluate(flat, 0.0), spherical_dome(potential, 1e-6)
+    evaluation, dome = potential.evaluate(flat, 0.0), guess_at_volume(potential, 1e-6)
     return float(-(evaluation.gradient[across] @ dome[across]) / (evaluation.volume_gradient[across] @ dome[across]))
 
 
@@ -192,7 +266,7 @@ def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, st
     kd = potential.space.half_bandwidth
     if point.state.pressure == pressure and negative_directions(point.state.evaluation.band, kd) == 0:
         return point.state
-    tracer = Tracer(Path(), StepControl().first * min(1.0, np.sqrt(abs(point.state.volume))))
+    tracer = Tracer(Path(), StepControl().first * min(1.0, np.sqrt(abs(point.state.volume - potential.space.reference_volume))))
     try:
         for _, new in zip(range(steps), trace_points(potential, point, tracer), strict=False):
             for met in Segment(potential, point, new).crossings("pressure", pressure):

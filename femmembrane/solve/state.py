@@ -51,12 +51,18 @@ class State:
 
 
 def rests_flat(potential: Potential) -> bool:
-    """Whether the flat membrane is an equilibrium without load: nothing pulls at it."""
+    """Whether the undeformed membrane is an equilibrium without load: nothing pulls at it."""
     return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
 
 
+def at_rest(potential: Potential, quantity: str, load: float) -> bool:
+    """Whether the membrane at rest is an equilibrium at a load: one without stiffness, which no path leaves or passes."""
+    rest = {"volume": potential.space.reference_volume, "pressure": 0.0, "height": potential.space.first_height}
+    return load == rest[quantity] and rests_flat(potential)
+
+
 def flat_state(potential: Potential) -> State:
-    """The flat membrane at rest: an equilibrium without stiffness, which no path leaves or passes."""
+    """The membrane at rest: an equilibrium, and where it is flat one without stiffness, which no path leaves or passes."""
     return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0))
 
 

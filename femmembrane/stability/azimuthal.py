@@ -16,9 +16,13 @@ and the quadratic form is, per reference area,
     + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: energy density of sources, loads)
 
 with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
-2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. A load g(eta) over the projected area adds the same with g for
-eta in the first term and g' before the others, and g'' rho rho_x b^2. Integrals over theta are normalised as for n = 0, 2 pi
-instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues do not depend on it. c plays no part at n = 0.
+2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Where an end moves in its plane, the lid that closes the volume
+there counts too: by parts -Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c b_x + n b c_x) - n rho_x b c dx, and at a free edge, whose
+lid is a film that its edge makes harmonic, b (r/rho)^n cos n theta to first order, further [n rho a b] of the two ends. A load g(eta) over
+the projected area adds the first form with g for eta in its first term and g' before the others, and g'' rho rho_x b^2.
+
+Integrals over theta are normalised as for n = 0, 2 pi instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues
+do not depend on it. c plays no part at n = 0.
 """
 
 from __future__ import annotations
@@ -32,16 +36,17 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from ..discretization.space import Space
+from ..discretization.space import Space, band_of
 from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
-from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from ..solve.banded import band_product
 from ..solve.wellposed import ill_posed, interval, unsupported
 from ..threads import one_thread
-from .spectrum import SmallestEigenvalue, SpectrumError, smallest_eigenvalue
+from .floating import pencil_of, rigid_part
+from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
 from .verdict import Verdict, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
@@ -179,6 +184,8 @@ class AzimuthalOperator:
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
+    rigid : ndarray, shape (n_free, k), or None
+        Motions of the membrane as a whole that nothing resists, see :mod:`.floating`.
     """
 
     band: Array
@@ -188,6 +195,11 @@ class AzimuthalOperator:
     n: int
     response: LocalResponse
     space: Space
+    rigid: Array | None = None
+
+    def pencil(self, constraint: Array | None = None) -> Pencil:
+        """K - lambda M, rigid motions taken out."""
+        return pencil_of(self.band, self.mass, self.half_bandwidth, constraint, 0.0, self.rigid)
 
     def shape(self, mode: Array) -> dict[str, Array]:
         """A mode at the nodes, see :func:`azimuthal_shape`."""
@@ -199,17 +211,18 @@ class _Layout:
 
     def __init__(self, space: Space, kind: int) -> None:
         degree, n_elements = space.degree, space.n_elements
-        n_nodes, n_local = degree * n_elements + 1, degree + 1
-        nodes = degree * np.arange(n_elements) + np.arange(n_local)[:, None]
-        free, opposite = _supports(space, kind, n_nodes)
+        n_local = degree + 1
+        nodes = space.nodes[degree * np.arange(n_elements) + np.arange(n_local)[:, None]]
+        free, opposite = _supports(space, kind)
         self.n_free = int(free.sum())
-        self.numbers: NDArray[np.int64] = np.full((n_nodes, 3), self.n_free, dtype=np.int64)
+        self.numbers: NDArray[np.int64] = np.full((space.n_nodes, 3), self.n_free, dtype=np.int64)
         self.numbers[free] = np.arange(self.n_free)
         self.numbers[opposite, _C // 2] = self.numbers[opposite, _A // 2]
         #: local row of c and element where c = -a on the axis
         self.flips = [(n_local, 0) if node == 0 else (2 * n_local - 1, n_elements - 1) for node in opposite]
         self.gather = np.concatenate([self.numbers[nodes, k] for k in range(3)])
-        self.half_bandwidth = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
+        open_curve = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
+        self.half_bandwidth = band_of(self.gather, self.n_free) if space.closed else open_curve
         self._tabulate(space)
         area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
         zero = np.zeros_like(area)
@@ -225,6 +238,7 @@ class _Layout:
             columns = slice(field * n_local, (field + 1) * n_local)
             rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
             rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
+        self._values = space.table[: space.n_quadrature, :n_local]
         outer = []
         for i, j in _PAIRS:
             product = np.einsum("qa,qb->abq", rows[i], rows[j])
@@ -246,6 +260,14 @@ class _Layout:
         flat: Array = np.bincount(self._band_index, local.ravel(), self.n_free * depth + 1)  # type: ignore[assignment]  # weighted: floats
         return flat[:-1].reshape(self.n_free, depth).T
 
+    def integrate(self, density: Array) -> Array:
+        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions."""
+        local = np.concatenate([self._values.T @ part for part in density])
+        for row, element in self.flips:
+            local[row, element] *= -1
+        total: Array = np.bincount(self.gather.ravel(), local.ravel(), self.n_free + 1)  # type: ignore[assignment]  # weighted: floats
+        return total[: self.n_free]
+
     def local(self, mode: Array) -> Array:
         """Coefficients of (a, c, b) in each element, shape (3 (degree + 1), n_elements)."""
         local = np.append(mode, 0.0)[self.gather]
@@ -259,25 +281,33 @@ def _layout(space: Space, kind: int) -> _Layout:
     return _Layout(space, kind)
 
 
-def _supports(space: Space, kind: int, n_nodes: int) -> tuple[NDArray[np.bool_], list[int]]:
+def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
     """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
 
     What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
-    constant in-plane part at n = 1, and vanishes for larger n.
+    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no
+    perturbations: one node is held against them, which takes none of the others away.
     """
-    free = np.ones((n_nodes, 3), dtype=bool)
+    free = np.ones((space.n_nodes, 3), dtype=bool)
     opposite = []
     radius = space.mesh.position(space.mesh.breakpoints()[[0, -1]])[0]
-    for node, held, R in zip((0, n_nodes - 1), space.mesh.supports(), radius, strict=True):
-        in_plane, vertical = "u" not in held, "w" not in held
+    for node, support, R in zip(space.nodes[[0, -1]].tolist(), space.supports, radius, strict=False):
+        in_plane, vertical = "u" not in support.held, "w" not in support.held
         if abs(R) < 1e-12:
             rigid = kind == 1 and vertical  # a pole that is held vertically is a fixed point
             free[node] = [rigid, False, kind == 0 and vertical]
             opposite += [node] if rigid else []
         else:
-            free[node] = [in_plane, in_plane, vertical]
+            free[node] = [in_plane, in_plane, vertical] if kind == 0 or not support.rigid else False
+    pinned = space.nodes[space.widest]
     if kind == 0:
         free[:, _C // 2] = False
+        if space.pin is not None:
+            free[pinned, _B // 2] = False
+    if kind == 1:  # at this radius a shift is seen in c, a tilt in b
+        shift, tilt = space.rotations
+        free[pinned, _C // 2] &= not shift
+        free[pinned, _B // 2] &= not tilt
     return free, opposite
 
 
@@ -311,7 +341,35 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
     band = layout.assemble(_density(space, response, potential.loads, pressure, n))
-    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space)
+    for end in space.free_ends if n else ():
+        rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
+        i, j = layout.numbers[space.nodes[end], [_A // 2, _B // 2]]
+        work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
+        for row, column in ((i, j), (j, i)):
+            band[2 * layout.half_bandwidth + row - column, column] += work
+    rigid = _rigid_motions(space, layout, response, int(n))
+    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, rigid)
+
+
+def _rigid_motions(space: Space, layout: _Layout, r: LocalResponse, n: int) -> Array | None:
+    """The part of the mass that belongs to motions as a whole: along the axis at n = 0; a shift and a tilt, if they are free, at n = 1."""
+    one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
+    shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
+    if n == 0:
+        motions = [(zero, zero, one)] if space.pin is not None else []
+    else:
+        free = space.rotations if n == 1 else (False, False)
+        motions = [motion for motion, is_free in zip((shift, tilt), free, strict=True) if is_free]
+        if free == (False, True):  # about the circle that is held in its plane
+            place = next(k for k, support in enumerate(space.supports) if "u" in support.held and not space.on_axis[k])
+            height = (r.eta[0, 0], r.eta[-1, -1])[place]
+            motions = [(r.eta - height, height - r.eta, -r.rho)]
+    if not motions:
+        return None
+    area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+    fields = np.array(motions)
+    gram = np.einsum("ifqe,jfqe,qe->ij", fields, fields, area)
+    return rigid_part(np.stack([layout.integrate(motion * area) for motion in fields], axis=1), gram)
 
 
 @lru_cache(maxsize=4)
@@ -332,34 +390,64 @@ def _density(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: fl
     J = np.hypot(space.R_x, space.Z_x)
     area = space.weights * space.R * J
     xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
-    g, g_z, g_zz = over_projection(loads, r.eta)
-    work = (g_z - pressure) * space.weights
+    g, g_z, g_zz = (part * space.weights for part in over_projection(loads, r.eta))
     t, z = r.t_rho, r.t_z
     A, B, N1, N2 = r.A, r.B, r.N1, r.N2
     along, out, across = A * t**2 + N2 * z**2, A * z**2 + N2 * t**2, (A - N2) * t * z  # of e, of f, mixed
     _, m_r, _, m_rr, m_rz, m_zz = r.field
-    volume_c = (g - pressure * r.eta) * space.weights
     entries = {
         (_A, _A): (r.W22 + n**2 * along) * oo + m_rr * area,
-        (_A, _AX): r.W12 * t * xo + volume_c,
+        (_A, _AX): r.W12 * t * xo,
         (_A, _C): n * (r.W22 + along) * oo,
-        (_A, _CX): -n * B * t * xo + n * volume_c,
-        (_A, _B): n**2 * across * oo + m_rz * area + work * r.rho_x,
+        (_A, _CX): -n * B * t * xo,
+        (_A, _B): n**2 * across * oo + m_rz * area,
         (_A, _BX): r.W12 * z * xo,
         (_AX, _AX): (r.W11 * t**2 + N1 * z**2) * xx,
-        (_AX, _C): n * r.W12 * t * xo + n * volume_c,
-        (_AX, _B): work * r.rho,
+        (_AX, _C): n * r.W12 * t * xo,
         (_AX, _BX): (r.W11 - N1) * t * z * xx,
         (_C, _C): (n**2 * r.W22 + along) * oo + m_r / r.rho * area,
-        (_C, _CX): -B * t * xo + volume_c,
-        (_C, _B): n * across * oo + n * work * r.rho_x,
+        (_C, _CX): -B * t * xo,
+        (_C, _B): n * across * oo,
         (_C, _BX): n * r.W12 * z * xo,
         (_CX, _CX): A * xx,
         (_CX, _B): -n * B * z * xo,
-        (_B, _B): n**2 * out * oo + m_zz * area + g_zz * r.rho * r.rho_x * space.weights,
+        (_B, _B): n**2 * out * oo + m_zz * area + g_zz * r.rho * r.rho_x,
         (_BX, _BX): (r.W11 * z**2 + N1 * t**2) * xx,
     }
-    return [entries[pair] for pair in _PAIRS]
+    parts = [_volume_density(space, r, -pressure * space.weights, n)]
+    if loads:
+        parts.append(_projected_density(r, g, g_z, n))
+    for pair, part in (item for added in parts for item in added.items()):
+        entries[pair] = entries[pair] + part if pair in entries else part
+    return [entries.get(pair, np.zeros_like(area)) for pair in _PAIRS]
+
+
+def _volume_density(space: Space, r: LocalResponse, work: Array, n: int) -> dict[tuple[int, int], Array]:
+    """Second derivatives of the enclosed volume over 2 pi, times ``work``."""
+    if space.lids and (n == 0 or space.spreads):
+        return {
+            (_A, _A): -work * r.eta_x,
+            (_A, _C): -n * work * r.eta_x,
+            (_A, _BX): -work * r.rho,
+            (_C, _C): -work * r.eta_x,
+            (_C, _B): n / 2 * work * r.rho_x,
+            (_C, _BX): -n / 2 * work * r.rho,
+            (_CX, _B): -n / 2 * work * r.rho,
+        }
+    return _projected_density(r, work * r.eta, work, n)
+
+
+def _projected_density(r: LocalResponse, g: Array, g_z: Array, n: int) -> dict[tuple[int, int], Array]:
+    """Second derivatives of an energy g(eta) over the projected area, but for those of g', from weighted g and g' at the points."""
+    return {
+        (_A, _AX): g,
+        (_A, _CX): n * g,
+        (_A, _B): g_z * r.rho_x,
+        (_AX, _C): n * g,
+        (_AX, _B): g_z * r.rho,
+        (_C, _CX): g,
+        (_C, _B): n * g_z * r.rho_x,
+    }
 
 
 @one_thread
@@ -380,20 +468,21 @@ def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigen
     if not operator.band.shape[1]:
         raise InputError("mesh.elements", 1, "one linear element has no unknowns with waves around the axis; two, or degree 2, are allowed")
     start = _Spectrum(operator, None).first_guess() if guess is None else guess
-    return smallest_eigenvalue(operator.band, operator.mass, operator.half_bandwidth, None, start)
+    return smallest_of(operator.pencil(), start)
 
 
 class _Spectrum:
     """The pencil (K, M), with constraint . phi = 0 if given."""
 
     def __init__(self, operator: AzimuthalOperator, constraint: Array | None) -> None:
-        self.band, self.mass, self.kd, self.constraint = operator.band, operator.mass, operator.half_bandwidth, constraint
+        self.pencil = operator.pencil(constraint)
+        self.band, self.kd, self.constraint = operator.band, operator.half_bandwidth, constraint
         self.n = int(operator.band.shape[1])
-        self.scale = float(np.abs(self.band[2 * self.kd] / self.mass[2 * self.kd]).max())
+        self.scale = self.pencil.scale
 
     def count(self, shift: float) -> int:
         """Number of eigenvalues below a shift, by inertia."""
-        return negative_directions(self.band - shift * self.mass, self.kd, self.constraint)
+        return self.pencil.count(shift)
 
     def lower_bound(self) -> float:
         """A shift below the spectrum."""
@@ -406,29 +495,31 @@ class _Spectrum:
 
     def first_guess(self, width: int = 6, iterations: int = 3) -> Array:
         """Best vector of a block of inverse iterations: the lowest azimuthal eigenvalues are too close together for a single vector."""
-        solver = BandFactor(self.band - self.lower_bound() * self.mass)
+        solver = self.pencil.shifted_solver(self.lower_bound())  # only without a constraint
         block = np.random.default_rng(0).standard_normal((self.n, min(width, self.n)))
 
-        def times(band: Array) -> Array:
-            return np.stack([band_product(band, self.kd, column) for column in block.T], axis=1)
+        def times(product: Callable[[Array], Array]) -> Array:
+            return np.stack([product(column) for column in block.T], axis=1)
 
         for _ in range(iterations):
-            block = np.linalg.qr(solver.solve(times(self.mass)))[0]
-        return np.asarray(block @ eigh(block.T @ times(self.band), block.T @ times(self.mass))[1][:, 0])
+            block = np.linalg.qr(self.pencil.solve(solver, times(self.pencil.times_mass)))[0]
+        return np.asarray(block @ eigh(block.T @ times(self._stiffness), block.T @ times(self.pencil.times_mass))[1][:, 0])
+
+    def _stiffness(self, x: Array) -> Array:
+        return band_product(self.band, self.kd, x)
 
     def lanczos(self, count: int, width: int) -> list[tuple[float, Array]]:
         """Shift-invert Lanczos iterations from a certified lower bound."""
         shift = self.lower_bound()
-        factor = BandFactor(self.band - shift * self.mass)
-        bordered = None if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, 0.0)
+        solver = self.pencil.shifted_solver(shift)
 
         def inverse(right: Array) -> Array:
-            return factor.solve(right.ravel()) if bordered is None else bordered.solve(right.ravel(), 0.0)[0]
+            return self.pencil.solve(solver, right.ravel())
 
         def operator(matvec: Callable[[Array], Array]) -> LinearOperator:
             return LinearOperator((self.n, self.n), matvec=matvec, dtype=float)
 
-        stiffness, mass = (operator(partial(_flat_product, band, self.kd)) for band in (self.band, self.mass))
+        stiffness, mass = (operator(partial(_flat, product)) for product in (self._stiffness, self.pencil.times_mass))
         start = inverse(np.random.default_rng(0).standard_normal(self.n))
         try:
             values, modes = eigsh(stiffness, k=count, M=mass, sigma=shift, OPinv=operator(inverse), v0=start, ncv=width, tol=1e-12)
@@ -438,12 +529,12 @@ class _Spectrum:
 
     def normalised(self, mode: Array) -> Array:
         """With mode . M mode = 1, the largest entry positive."""
-        size = np.sqrt(mode @ band_product(self.mass, self.kd, mode))
+        size = np.sqrt(mode @ self.pencil.times_mass(mode))
         return mode / (size * np.sign(mode[np.argmax(np.abs(mode))]))
 
 
-def _flat_product(band: Array, half_bandwidth: int, x: Array) -> Array:
-    return band_product(band, half_bandwidth, x.ravel())
+def _flat(product: Callable[[Array], Array], x: Array) -> Array:
+    return product(x.ravel())
 
 
 @one_thread

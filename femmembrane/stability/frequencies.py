@@ -20,10 +20,9 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
-from ..solve.banded import band_product
 from ..solve.wellposed import ill_posed
 from .azimuthal import azimuthal_operator, azimuthal_shape, lowest_eigenvalues, short_waves
-from .spectrum import Pencil, SpectrumError
+from .spectrum import SpectrumError
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +108,11 @@ def natural_frequencies(
     except SpectrumError as error:
         raise SolveError(f"no natural frequencies: {error}", status=Status.NOT_CONVERGED) from error
     constraint = evaluation.volume_gradient if n == 0 and control == "volume" else None
-    pencil = Pencil(operator.band, operator.mass, operator.half_bandwidth, constraint, 0.0)
+    pencil = operator.pencil(constraint)
     shape = partial(_shape_at_nodes, potential, operator.n)
     vibrations = []
     for _, mode in found:
-        value, error_bound = pencil.quotient(mode, band_product(operator.mass, operator.half_bandwidth, mode))
+        value, error_bound = pencil.quotient(mode, pencil.times_mass(mode))
         mode.flags.writeable = False
         vibrations.append(Vibration(value, error_bound, operator.n, None if n else control, mode, shape))
     return tuple(vibrations)

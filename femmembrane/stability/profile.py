@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization.space import space_of
+from ..discretization.space import space_of_scene
 from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
@@ -27,6 +27,8 @@ class Profile:
     ----------
     r : ndarray
         Reference radius over R0.
+    s : ndarray or None
+        Arc length of the reference meridian from its first end, over R0; None where it runs along the radius, from R = s.
     rho, eta : ndarray
         Deformed radius and height over R0.
     strain : (ndarray, ndarray)
@@ -36,6 +38,7 @@ class Profile:
     """
 
     r: Array
+    s: Array | None
     rho: Array
     eta: Array
     strain: tuple[Array, Array]
@@ -46,6 +49,7 @@ class Profile:
         """The profile by the names of its columns, with stretches in place of strains, and the stresses in Pa too if there are scales."""
         columns = {
             "r": self.r,
+            **({} if self.s is None else {"s": self.s}),
             "rho": self.rho,
             "eta": self.eta,
             "stretch_1": np.exp(self.strain[0]),
@@ -72,7 +76,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
         P = p R0/(mu T); enters the total stresses only, with what loads add to it.
     s : ndarray, shape (n,)
     """
-    space = space_of(scene.mesh, scene.degree)
+    space = space_of_scene(scene)
     u, _, w, _ = space.evaluate(x, s)
     u_s, w_s = space.recovered_slopes(x, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
@@ -86,4 +90,4 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
     local = pressure - over_projection(scene.loads, eta)[1]
     total = total_stress(mechanical, local, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
-    return Profile(R, rho, eta, (e1, e2), mechanical, total)
+    return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total)

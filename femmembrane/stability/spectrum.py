@@ -66,9 +66,13 @@ def smallest_eigenvalue(
     SpectrumError
         When neither method yields an eigenvalue with a proof by inertia.
     """
-    if constraint is not None and compliance == 0 and band.shape[1] < 2:
+    return smallest_of(Pencil(band, mass, half_bandwidth, constraint, compliance), guess)
+
+
+def smallest_of(pencil: Pencil, guess: Array | None = None) -> SmallestEigenvalue:
+    """As :func:`smallest_eigenvalue`, of a pencil."""
+    if pencil.constraint is not None and pencil.compliance == 0 and pencil.n < 2:
         raise SpectrumError("one unknown under one constraint leaves nothing to perturb")
-    pencil = Pencil(band, mass, half_bandwidth, constraint, compliance)
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.proved(start)
     if found is None:
@@ -85,6 +89,9 @@ def smallest_eigenvalue(
 
 class Pencil:
     """K - lambda M with its constraint: factors, inertia and iterations at any shift."""
+
+    #: whether K and M are band matrices, which the compiled half knows
+    banded = True
 
     def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float) -> None:
         self.band, self.mass, self.kd, self.constraint, self.compliance = band, mass, kd, constraint, compliance
@@ -103,6 +110,9 @@ class Pencil:
         forces = band_product(np.abs(self.band), self.kd, np.abs(mode))
         return float(np.abs(mode) @ forces), float(np.sqrt(np.sum(forces**2 / self.mass[2 * self.kd])))
 
+    def times_mass(self, mode: Array) -> Array:
+        return band_product(self.mass, self.kd, mode)
+
     def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
         factor = BandFactor(self.band - shift * self.mass)
         return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, -self.compliance)
@@ -113,7 +123,7 @@ class Pencil:
     def normalised(self, mode: Array) -> tuple[Array, Array]:
         """Mode and M mode with mode . M mode = 1, the largest entry of the mode positive."""
         mode = mode / np.abs(mode).max()  # a solve with a singular matrix may leave numbers whose squares overflow
-        product = band_product(self.mass, self.kd, mode)
+        product = self.times_mass(mode)
         size = np.sqrt(mode @ product) * np.sign(mode[np.argmax(np.abs(mode))])
         return mode / size, product / size
 
@@ -138,7 +148,7 @@ class Pencil:
 
     def proved(self, guess: Array) -> tuple[float, Array, float] | None:
         """What :meth:`rayleigh` finds from a guess, if nothing lies below."""
-        module = native()
+        module = native() if self.banded else None
         if module is None:
             found = self.rayleigh(guess)
             return None if found is None or self.below(*found[:2]) > 0 else found
@@ -203,7 +213,7 @@ class Pencil:
         shift = self.lower_bound()
         solver = self.shifted_solver(shift)
         shape = (self.n, self.n)
-        mass = LinearOperator(shape, matvec=lambda x: band_product(self.mass, self.kd, x.ravel()), dtype=float)
+        mass = LinearOperator(shape, matvec=lambda x: self.times_mass(x.ravel()), dtype=float)
         inverse = LinearOperator(shape, matvec=lambda x: self.solve(solver, x.ravel()), dtype=float)
         stiffness = LinearOperator(shape, matvec=lambda x: self.stiffness(x.ravel()), dtype=float)
         start = self.solve(solver, np.random.default_rng(0).standard_normal(self.n))

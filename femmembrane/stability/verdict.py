@@ -16,7 +16,8 @@ from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..potential import Evaluation, Potential
 from ..solve.wellposed import ill_posed
-from .spectrum import SmallestEigenvalue, smallest_eigenvalue
+from .floating import pencil_of
+from .spectrum import SmallestEigenvalue, smallest_of
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,10 @@ class Verdict:
 
     @property
     def mode(self) -> Mapping[str, Array] | None:
-        """The shape of the perturbation at the nodes: r (reference radius), u, w, and c around the axis for azimuthal ones."""
+        """The shape of the perturbation at the nodes: r (reference radius), u, w, and c around the axis for azimuthal ones.
+
+        Of a membrane that nothing holds it is known up to a motion of the whole.
+        """
         return None if self._shape is None or self.coefficients is None else self._shape(self.coefficients)
 
     @property
@@ -99,7 +103,9 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
-    found = smallest_eigenvalue(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, guess, soft)
+    found = smallest_of(
+        pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid), guess
+    )
     held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control]
     return verdict_from(found, f"axisymmetric perturbations {held}", control, 0, partial(mode_shape, potential.space))
 

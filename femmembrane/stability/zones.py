@@ -25,7 +25,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization.space import Space, space_of
+from ..discretization.space import Space, space_of_scene
 from ..errors import unknown_name
 from ..scene import WRINKLING, Scene
 from .profile import Profile, profile_at
@@ -170,7 +170,7 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
         profile = profile_at(scene, x, pressure, s)
         return profile.total if criterion == "total" else _mechanical(profile, scene.tension_field)
 
-    codes, edges = _tiles(space_of(scene.mesh, scene.degree), deciding)
+    codes, edges = _tiles(space_of_scene(scene), deciding)
     area, deformed = _areas(scene, x, pressure, edges)
     ends = profile_at(scene, x, pressure, edges)
     r, rho, s = (list(zip(v[:-1].tolist(), v[1:].tolist(), strict=True)) for v in (ends.r, ends.rho, edges))
@@ -241,7 +241,7 @@ def _samples(space: Space) -> Array:
 
 def _areas(scene: Scene, x: Array, pressure: float, edges: Array) -> tuple[Array, Array]:
     """Parts of the reference and of the deformed area between neighbouring edges, each of shape (len(edges) - 1,)."""
-    space = space_of(scene.mesh, scene.degree)
+    space = space_of_scene(scene)
     ends = np.union1d(space.ends, edges)
     points, weights = np.polynomial.legendre.leggauss(space.degree + 3)
     s = ends[:-1, None] + np.diff(ends)[:, None] * (points + 1) / 2

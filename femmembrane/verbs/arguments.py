@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, unknown_name
+from ..potential import Potential
 
 ILL_POSED = ("stop", "mark")
 
@@ -22,6 +23,14 @@ def check_ill_posed(ill_posed: Any) -> None:
     """Raise InputError unless what to do in compression is known."""
     if ill_posed not in ILL_POSED:
         raise unknown_name("ill_posed", str(ill_posed), ILL_POSED)
+
+
+def check_height(key: str, potential: Potential) -> None:
+    """Raise InputError where the height of the first point of the meridian is held, and cannot be prescribed."""
+    if potential.space.pole == potential.space.n_free:
+        raise InputError(
+            key, "a height", f"the first end of this {potential.scene.mesh.shape} is held along the axis; prescribe a volume or a pressure"
+        )
 
 
 def check_increasing(key: str, values: Any, most: int | None = None) -> tuple[int, ...]:

@@ -15,6 +15,7 @@ from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
 from ..solve.finer import transferred
 from ..solve.newton import correct
+from ..solve.start import moderate
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_increasing
@@ -25,8 +26,8 @@ from .trace import trace
 _CONTROLS: dict[str, Any] = {"volume": VolumeControl, "pressure": PressureControl, "center_height": CenterHeightControl}
 #: least number of elements of the reference, all of the highest degree
 _REFERENCE_ELEMENTS = 32
-#: a branch is traced from this volume, or half-way to its first limit point, to a little beyond that
-_TRACED_FROM, _TRACED_BEYOND = 0.5, 1.1
+#: a branch is traced from the moderately inflated membrane to a little beyond the volume of its first limit point
+_TRACED_BEYOND = 1.1
 
 
 @one_thread
@@ -206,11 +207,12 @@ class _Study:
 
     def _stretch(self, fine: Equilibrium) -> tuple[float, float] | None:
         """Volumes between which the first limit point lies on the reference mesh."""
-        if fine.volume <= _TRACED_FROM:
+        first = fine.potential.space.reference_volume + moderate(fine.potential)
+        if fine.volume <= first:
             return None
-        branch = trace(fine.scene, start=_TRACED_FROM, until={"volume": fine.volume})
+        branch = trace(fine.scene, start=first, until={"volume": fine.volume})
         volumes = [p.volume for p in branch.special_points or () if p.kind == "limit_point"]
-        return (_TRACED_FROM, _TRACED_BEYOND * volumes[0]) if volumes else None
+        return (first, _TRACED_BEYOND * volumes[0]) if volumes else None
 
     def _first_limit(self, eq: Equilibrium) -> dict[str, float]:
         points = []

@@ -21,11 +21,12 @@ from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
 from ..solve.search import Limit, beyond_limit
 from ..solve.special_points import ON_FOLD
-from ..solve.start import START_VOLUME, start_at_height, start_at_pressure, start_at_volume
-from ..solve.state import Path, State, flat_state, rests_flat
+from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume
+from ..solve.state import Path, State, at_rest, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
+from .arguments import check_height
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
 from .trace import resume_trace, trace
@@ -224,6 +225,8 @@ def _follow(
             raise
         return Branch(scene, (), error.status, str(error))
     clock, potential = time.perf_counter(), potential_of(scene)
+    if control == "height":
+        check_height("center_height", potential)
     timings |= {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
@@ -325,8 +328,10 @@ class _Walk:
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
             self.state, self.path = self._first(load), Path()
-        elif self.load * load <= 0 and rests_flat(self.potential):
+        elif self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
             return self._through_flat(load, jump)
+        elif at_rest(self.potential, self.quantity, load):
+            self.state, self.path = flat_state(self.potential), Path()
         elif load != self.load:
             try:
                 states = march(self.potential, self.state, self.control_at, self.load, load, path=self.path, corrector=self.corrector)
@@ -402,9 +407,11 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
         raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
     scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
-    state = start_at_volume(potential, START_VOLUME) if start is None else resume(potential, start)
-    if rests_flat(potential) and gas.pressure(0.0) == 0:
+    if rests_flat(potential) and gas.pressure(potential.space.reference_volume) == 0:
         return record(scene, potential, flat_state(potential), clock=clock, gas=gas)
+    state = (
+        start_at_volume(potential, potential.space.reference_volume + moderate(potential)) if start is None else resume(potential, start)
+    )
     # the amount that holds the state at hand is known: march from it to the wanted one
     held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
     if held <= 0 or state.volume <= -gas.chamber:

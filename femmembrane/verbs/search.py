@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..potential import potential_of
 from ..results.records import Equilibrium
 from ..scene import Scene
-from ..solve.search import STARTS, Search
+from ..solve.search import Search
 from ..threads import one_thread
 from .arguments import check_max_steps
 from .recording import record
@@ -90,7 +90,7 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     order = np.argsort(energies, kind="stable")
     spans = ", ".join(f"V = {low:.4g} to {high:.4g}" for low, high in search.traced)
     searched = (
-        f"searched: {len(search.traced)} traced stretch(es) ({spans}), starts at V = {', '.join(f'{v:g}' for v in STARTS)}, "
+        f"searched: {len(search.traced)} traced stretch(es) ({spans}), starts at V = {', '.join(f'{v:g}' for v in search.starts)}, "
         f"{search.deflations} deflated solves ({search.iterations} iterations)"
         + (f"; {len(search.ill_posed)} ill-posed state(s) left out, whose shape depends on the mesh" if search.ill_posed else "")
     )

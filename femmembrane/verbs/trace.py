@@ -15,11 +15,11 @@ from ..scene import QUANTITIES, Scene
 from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
-from ..solve.start import start_at_volume
-from ..solve.state import Path
+from ..solve.start import moderate, start_at_volume
+from ..solve.state import Path, at_rest
 from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
-from .arguments import check_ill_posed, check_max_steps
+from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
 
@@ -31,7 +31,7 @@ CONTACT = 1e-3
 def trace(
     scene: Scene,
     *,
-    start: float | Equilibrium | Branch = 0.5,
+    start: float | Equilibrium | Branch | None = None,
     until: Mapping[str, float] | None = None,
     direction: int = 1,
     max_steps: int = 400,
@@ -47,9 +47,10 @@ def trace(
     Parameters
     ----------
     scene : Scene
-    start : float, Equilibrium or Branch
-        A volume, an equilibrium of this scene, or a traced branch to be continued (its points are part of the result, and the new
-        ones are those of an uninterrupted trace to the last bit; it keeps its own direction, step and search for special points).
+    start : float, Equilibrium or Branch, optional
+        A volume (default that of the moderately inflated membrane: that at rest and 0.5, or an eighth of it), an equilibrium of this scene,
+        or a traced branch to be continued (its points are part of the result, and the new ones are those of an uninterrupted trace to
+        the last bit; it keeps its own direction, step and search for special points).
     until : mapping, optional
         Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it. The
         start itself does not count, and what lies behind it is met, if at all, on a distant part of the branch: see ``direction``.
@@ -84,6 +85,8 @@ def trace(
     targets = _targets(until)
     scene, start, timings = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
     tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)
+    if "center_height" in targets:
+        check_height("until.center_height", tracing.potential)
     tracing.timings |= timings
     status, message = tracing.follow(targets, ill_posed, on_checkpoint)
     branch = tracing.branch(status, message)
@@ -111,13 +114,13 @@ def resume_trace(
 
 def _on_mesh(
     scene: Scene,
-    start: float | Equilibrium | Branch,
+    start: float | Equilibrium | Branch | None,
     until: Mapping[str, float] | None,
     direction: int,
     max_steps: int,
     steps: StepControl | None,
     ill_posed: str,
-) -> tuple[Scene, float | Equilibrium | Branch, dict[str, float]]:
+) -> tuple[Scene, float | Equilibrium | Branch | None, dict[str, float]]:
     """The scene with a mesh, the start on it and the seconds that took; a branch that is continued keeps the mesh chosen for it."""
     if isinstance(start, Branch) and scene.open and getattr(start.scene.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
         return scene.replace(mesh=start.scene.mesh, degree=start.scene.degree), start, {}
@@ -143,7 +146,7 @@ def _on_mesh(
 def trace_iter(
     scene: Scene,
     *,
-    start: float | Equilibrium = 0.5,
+    start: float | Equilibrium | None = None,
     direction: int = 1,
     max_steps: int = 400,
     steps: StepControl | None = None,
@@ -167,7 +170,7 @@ def trace_iter(
 @one_thread
 def _begin(
     scene: Scene,
-    start: float | Equilibrium | Branch,
+    start: float | Equilibrium | Branch | None,
     direction: int,
     steps: StepControl | None,
     special_points: bool,
@@ -216,7 +219,7 @@ class _Tracing:
     def begin(
         cls,
         scene: Scene,
-        start: float | Equilibrium | Branch,
+        start: float | Equilibrium | Branch | None,
         direction: int,
         steps: StepControl,
         special_points: bool,
@@ -235,8 +238,10 @@ class _Tracing:
             return cls._continued(scene, potential, start, tracer, on_step, max_steps)
         if isinstance(start, Equilibrium):
             state = resume(potential, start)
+        elif start is None:
+            state = start_at_volume(potential, potential.space.reference_volume + moderate(potential))
         elif isinstance(start, (int, float, np.number)) and not isinstance(start, bool) and np.isfinite(start):
-            if start == 0 and not potential.surrounded:
+            if at_rest(potential, "volume", float(start)):
                 raise InputError(
                     "start", start, "the flat unloaded membrane has no stiffness to start from; a small volume is allowed, such as 1e-3"
                 )

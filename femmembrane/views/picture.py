@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, unknown_name
 from ..results.store import MEANING, replace_file
 from ..stability.zones import KINDS
-from .stage import Box, clamped_ends, surroundings
+from .stage import Box, surroundings
 from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
 
 if TYPE_CHECKING:
@@ -113,7 +113,14 @@ class Surface:
         else:
             profile = smooth_profile(equilibrium, points=_POINTS)
             values = profile[quantity]
-        return cls(equilibrium, quantity, profile["rho"], profile["eta"], Revolution.of(profile["r"], sectors), values)
+        return cls(
+            equilibrium,
+            quantity,
+            profile["rho"],
+            profile["eta"],
+            Revolution.of(profile["r"], sectors, equilibrium.potential.space.closed),
+            values,
+        )
 
     @property
     def points(self) -> Array:
@@ -126,8 +133,10 @@ class Surface:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Smallest and largest value."""
-        return float(self.values.min()), float(self.values.max())
+        """Smallest and largest value, apart by as much as is worth a colour."""
+        low, high = float(self.values.min()), float(self.values.max())
+        spare = max(0.005 * max(abs(low), abs(high)) - (high - low) / 2, 0.0)
+        return low - spare, high + spare
 
 
 def check_quantity(quantity: str, scene: Scene, key: str = "quantity") -> None:
@@ -153,7 +162,7 @@ def new_plotter(size: tuple[int, int], off_screen: bool = True) -> Iterator[pyvi
 
 
 def draw_surface(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, float], size: float) -> None:
-    """Draw a surface, the ends where it is held and a few circles, in place of the one drawn before.
+    """Draw a surface, its ends, hubs and a few circles, in place of the one drawn before.
 
     Colours span the limits; lines are as thick as suits a membrane of the size.
     """
@@ -170,21 +179,25 @@ def draw_surface(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float
         mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
         look |= {"scalars": surface.quantity, "clim": limits, "cmap": _MAP}
     plotter.add_mesh(mesh, **look)
-    held = [node for node, _, _ in clamped_ends(surface.equilibrium, surface.rho.size)]
+    ends = [end % surface.rho.size for end in surface.equilibrium.potential.space.edges]
     tubes = [
         pyvista.lines_from_points(points[revolution.node == node], close=True).tube(radius=radius * size, n_sides=8)
-        for node, radius in circles(surface.rho, surface.eta, held)
+        for node, radius in circles(surface.rho, surface.eta, ends)
     ]
     if tubes:
         plotter.add_mesh(pyvista.merge(tubes), color="black", ambient=1.0, diffuse=0.0, name="circles", **_STILL)
+    for k in surface.equilibrium.potential.space.hubs:
+        center, radius = (0.0, 0.0, float(surface.eta[k])), float(surface.rho[k])
+        disc = pyvista.Disc(center=center, inner=0.0, outer=radius, normal=(0, 0, 1), c_res=4 * SECTORS)
+        plotter.add_mesh(disc, color="#9a9a9a", ambient=0.4, diffuse=0.6, name=f"hub {k}", **_STILL)
 
 
-def circles(rho: Array, eta: Array, held: Sequence[int], count: int = 6) -> list[tuple[int, float]]:
-    """Nodes whose circles are drawn, with their thickness: ends that are held, and a few at equal distances along the meridian."""
+def circles(rho: Array, eta: Array, ends: Sequence[int], count: int = 6) -> list[tuple[int, float]]:
+    """Nodes whose circles are drawn, with their thickness: ends off the axis, and a few at equal distances along the meridian."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rho), np.diff(eta)))])
     shown = np.searchsorted(length, length[-1] * np.arange(count + 1) / count).clip(max=rho.size - 1)
-    thin = [int(node) for node in np.unique(shown) if rho[node] > 1e-9 and node not in held]
-    return [*((node, 0.0015) for node in thin), *((node, 0.005) for node in held)]
+    thin = [int(node) for node in np.unique(shown) if rho[node] > 1e-9 and node not in ends]
+    return [*((node, 0.0015) for node in thin), *((node, 0.005) for node in ends)]
 
 
 def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, float]) -> None:

@@ -142,7 +142,7 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
 
 
 def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
-    """Taut and wrinkled zones: reference radius against volume, or against the step where the volume is not monotone.
+    """Taut and wrinkled zones: reference radius (of a curved meridian: arc length) against volume, or the step where that is not monotone.
 
     Parameters
     ----------
@@ -170,7 +170,8 @@ def draw_zones(axes: Axes, branch: Branch) -> list[Any]:
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
     handles = fill_zones(axes, branch, volume if monotone else np.arange(volume.size, dtype=float))
     axes.set_xlabel(VOLUME_LABEL if monotone else "step")
-    axes.set_ylabel("reference radius r/R₀")
+    flat = "s" not in branch[0].profile()
+    axes.set_ylabel("reference radius r/R₀" if flat else "arc length of the reference meridian s/R₀")
     axes.margins(0)
     return list(handles)
 
@@ -467,13 +468,19 @@ def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) 
 
 
 def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style, *, zones: bool | None = None) -> None:
-    """The deformed meridian, both halves, under the style's label; with the wrinkled zones, by default when the scene asks for them."""
+    """The deformed meridian, both halves, and rigid hubs, under the style's label.
+
+    With the wrinkled zones, by default when the scene asks for them.
+    """
     if equilibrium.scene.analysis.wrinkling if zones is None else zones:
         draw_meridian_zones(axes, equilibrium)
     profile = smooth_profile(equilibrium, points=_CURVE)
     rho, eta = profile["rho"], profile["eta"]
     look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
-    axes.plot(np.concatenate([-rho[::-1], rho]), np.concatenate([eta[::-1], eta]), label=style.label or None, **look)
+    cut = [np.nan] if rho[0] > 0 else []  # the halves meet on the axis only
+    axes.plot(np.concatenate([-rho[::-1], cut, rho]), np.concatenate([eta[::-1], cut, eta]), label=style.label or None, **look)
+    for k in equilibrium.potential.space.hubs:
+        axes.plot([-rho[k], rho[k]], [eta[k], eta[k]], color=style.color, linewidth=3 * style.width, solid_capstyle="butt", alpha=0.5)
 
 
 def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium]) -> None:

@@ -324,8 +324,8 @@ def _along(equilibrium: Equilibrium, names: tuple[str, ...]) -> Figure:
     for name, dashes, color in zip(names, _DASHES, _COLORS, strict=False):
         way = {"1": "along the meridian", "2": "around the axis"}[name[-1]]
         kind = name[:-2].replace("_", " ")
-        axes.plot(profile["r"], profile[name], linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
-    axes.set_xlabel("reference radius R/R₀")
+        axes.plot(profile.get("s", profile["r"]), profile[name], linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
+    axes.set_xlabel("arc length of the reference meridian s/R₀" if "s" in profile else "reference radius R/R₀")
     axes.grid(color="0.9", linewidth=0.6)
     if profile[names[0]].min() < 0 or min(profile[name].min() for name in names) < 0:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)

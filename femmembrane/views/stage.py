@@ -88,13 +88,11 @@ def surroundings(scene: Scene, box: Box) -> Surroundings:
 
 def clamped_ends(equilibrium: Equilibrium, nodes: int = 2) -> list[tuple[int, float, float]]:
     """The ends of the meridian that are held in every direction, off the axis: place among so many nodes, radius, height."""
-    mesh = equilibrium.scene.mesh
-    profile = equilibrium.profile()
-    ends = zip((0, -1), mesh.supports(), strict=True)
+    space, profile = equilibrium.potential.space, equilibrium.profile()
     return [
         (end % nodes, float(profile["rho"][end]), float(profile["eta"][end]))
-        for end, held in ends
-        if {"u", "w"} <= held and profile["r"][end] > 0
+        for end in space.edges
+        if {"u", "w"} <= space.supports[end].held
     ]
 
 

@@ -68,12 +68,16 @@ class Revolution:
     line: NDArray[np.int32]
 
     @classmethod
-    def of(cls, r: Array, sectors: int = SECTORS) -> Revolution:
-        """Revolve nodes at the reference radii r; a node with r = 0 lies on the axis."""
+    def of(cls, r: Array, sectors: int = SECTORS, closed: bool = False) -> Revolution:
+        """Revolve nodes at the reference radii r; a node with r = 0 lies on the axis, and the last one of a closed curve is the first."""
         copies = np.where(r > 0, sectors, 1)
+        if closed:
+            copies[-1] = 0
         first = np.cumsum(copies) - copies
         turn = np.arange(sectors)
-        point = first[:, None] + np.where(copies[:, None] > 1, turn, 0)
+        point = first[:, None] + np.where(copies[:, None] == 1, 0, turn)
+        if closed:
+            point[-1] = point[0]
         a, b = point[:-1], point[1:]
         cells = np.stack([a, b, np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)], axis=2).reshape(-1, 4).astype(np.int32)
         inner, outer = cells[:, 0] == cells[:, 3], cells[:, 1] == cells[:, 2]
@@ -150,12 +154,12 @@ def remove_surfaces(path: Path, keep: int = 0) -> None:
 def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array]:
     """The profile at the nodes, with any value that is not defined on the axis (0/0) taken from the node next to it.
 
-    With fewer nodes than ``points`` it is taken at that many radii instead, where the meridian is a function of the radius, so that
-    the curvature of long elements shows.
+    With fewer nodes than ``points`` it is taken at that many places instead, so that the curvature of long elements shows.
     """
     found = equilibrium.profile()
-    if found["r"].size < points and (np.diff(found["r"]) > 0).all():
-        found = equilibrium.profile(np.linspace(found["r"][0], found["r"][-1], points))
+    if found["r"].size < points:
+        s = equilibrium.potential.space.node_parameters()
+        found = equilibrium.profile(np.linspace(s[0], s[-1], points))
     profile = {key: np.array(values, dtype=np.float64) for key, values in found.items()}
     for values in profile.values():
         for end, beside in ((0, 1), (-1, -2)):
@@ -168,7 +172,7 @@ def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: 
     """Write the surface of one equilibrium as a VTU file."""
     import meshio
 
-    revolution = Revolution.of(profile["r"])
+    revolution = Revolution.of(profile["r"], closed=equilibrium.potential.space.closed)
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     mesh = meshio.Mesh(

@@ -120,7 +120,7 @@ def shown_kinds(zones: Zones) -> tuple[str, ...]:
 
 
 def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
-    """The zones of a branch as filled regions, reference radius upwards.
+    """The zones of a branch as filled regions, the parameter of the meridian (of a flat one: the reference radius) upwards.
 
     Borders go straight from one equilibrium to the next; where the kinds of zones change, the states between are interpolated, but for
     a snap, which has none.
@@ -138,7 +138,7 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     from matplotlib.patches import Patch
 
     for places, part in _runs(*_with_changes(branch, across)):
-        edges = np.array([[part[0][0].r[0], *(zone.r[1] for zone in z)] for z in part])
+        edges = np.array([[part[0][0].s[0], *(zone.s[1] for zone in z)] for z in part])
         edges = np.concatenate([edges[:1], edges, edges[-1:]])
         for k, kind in enumerate(part[0].kinds):
             look: dict[str, Any] = {"facecolor": PATTERNS[kind].fill, "hatch": PATTERNS[kind].hatch, "edgecolor": "0.3", "lw": 0.0}

@@ -1,0 +1,336 @@
+"""Reference meridians beyond the disc: annulus, spherical cap, sphere, tube, torus.
+
+The parameter s is the arc length of the reference meridian over R0, from its first end to its last (of an annulus: the radius). A meridian
+runs so that the pressure pushes to its left: outwards where it closes a space, up where it is flat::
+
+    annulus  z |        hub              cap  z |  .--.          sphere   .-s=0.       cylinder   |    s = 0      torus       s = 0
+               |======o--------o rim            |      '.        z |    .'      '.      z |       |                 z |      .--.
+               +------a--------1--> r           +---------o--> r   +---|----------|     --+-------|--> r            --+-----(----)--> r
+                    s = a    s = 1            s = 0    rim         |    '.      .'        |       |                   |      '--'
+                                                                          '-s=pi'              s = length                aspect
+
+======== =================================================================== ========================================================
+shape    R0 is                                                               reference curve
+======== =================================================================== ========================================================
+annulus  the outer radius                                                    R = s, Z = 0
+cap      the radius of the rim                                               an arc of a circle from the apex, at ``height``, to Z = 0
+sphere   its radius                                                          R = sin s, Z = cos s
+cylinder its radius                                                          R = 1, Z = length/2 - s
+torus    the radius of the tube                                              R = aspect + sin s, Z = cos s
+======== =================================================================== ========================================================
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from numbers import Real
+from typing import Any, Self
+
+import numpy as np
+
+from ..errors import InputError
+from .meridian import ELEMENTS, Array, check_elements, check_ratio, geometric_ends, graded_alike
+from .supports import POLE, SUPPORTS, Support, check_support
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Graded:
+    """An open curve from s = ``start`` to ``stop`` with elements in geometric progression."""
+
+    elements: int = ELEMENTS
+    ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "elements", check_elements(self.elements))
+        object.__setattr__(self, "ratio", check_ratio(self.ratio, "size of the last element over size of the first"))
+        for f in fields(self):
+            if f.name in _ENDS:
+                check_support(f"mesh.{f.name}", getattr(self, f.name))
+
+    @property
+    def start(self) -> float:
+        return 0.0
+
+    @property
+    def stop(self) -> float:
+        raise NotImplementedError
+
+    def breakpoints(self) -> Array:
+        share = geometric_ends(self.elements, self.ratio)
+        ends = self.start + (self.stop - self.start) * share
+        ends[-1] = self.stop
+        return ends
+
+    def with_elements(self, elements: int) -> Self:
+        """Another number of elements whose ends are the same function of k/elements."""
+        return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
+
+    def refined(self) -> Self:
+        return self.with_elements(2 * self.elements)
+
+
+#: fields that name supports
+_ENDS = ("inner", "outer", "rim", "top", "bottom")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Annulus(_Graded):
+    """Flat ring between two radii: R = s, Z = 0, inner_radius <= s <= 1.
+
+    Parameters
+    ----------
+    inner_radius : float
+        Over R0, the outer radius; between 0 and 1.
+    elements, ratio : int, float
+        Number of elements, and the size of the outermost over that of the innermost.
+    inner, outer : str
+        How the edges are held, see :mod:`.supports`; a ``hub`` is a rigid disc of the inner radius.
+
+    Raises
+    ------
+    InputError
+    """
+
+    inner_radius: float
+    inner: str = "hub"
+    outer: str = "clamped"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _convert(self, "inner_radius", above=0, below=1)
+
+    @property
+    def shape(self) -> str:
+        return "annulus"
+
+    @property
+    def start(self) -> float:
+        return self.inner_radius
+
+    @property
+    def stop(self) -> float:
+        return 1.0
+
+    def position(self, s: Array) -> tuple[Array, Array]:
+        return s, np.zeros_like(s)
+
+    def tangent(self, s: Array) -> tuple[Array, Array]:
+        return np.ones_like(s), np.zeros_like(s)
+
+    def supports(self) -> tuple[Support, Support]:
+        return SUPPORTS[self.inner], SUPPORTS[self.outer]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cap(_Graded):
+    """Spherical cap over a rim of unit radius in the plane Z = 0, from its apex on the axis.
+
+    With H = ``height`` the sphere has the radius a = (1 + H^2)/(2 |H|), and R = a sin(s/a).
+
+    Parameters
+    ----------
+    height : float
+        Of the apex over the plane of the rim, in R0; negative: the cap hangs below it, inverted; 0: flat.
+    elements, ratio : int, float
+        Number of elements, and the size of that at the rim over that of that at the apex.
+    rim : str
+        How the rim is held, see :mod:`.supports`.
+
+    Raises
+    ------
+    InputError
+    """
+
+    height: float
+    rim: str = "clamped"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _convert(self, "height", above=-1e3, below=1e3)
+        if abs(self.height) < 1e-150:  # its radius of curvature has no number
+            object.__setattr__(self, "height", 0.0)
+
+    @property
+    def shape(self) -> str:
+        return "cap"
+
+    @property
+    def _radius(self) -> float:
+        return (1 + self.height**2) / (2 * abs(self.height)) if self.height else math.inf
+
+    @property
+    def stop(self) -> float:
+        return 2 * math.atan(abs(self.height)) * self._radius if self.height else 1.0
+
+    def position(self, s: Array) -> tuple[Array, Array]:
+        if not self.height:
+            return s, np.zeros_like(s)
+        a = self._radius
+        # cos(s/a) - cos(stop/a) as a product: the height of a shallow cap is far below round-off of its radius of curvature
+        Z = 2 * a * np.sin((self.stop + s) / (2 * a)) * np.sin((self.stop - s) / (2 * a))
+        return a * np.sin(s / a), math.copysign(1.0, self.height) * Z
+
+    def tangent(self, s: Array) -> tuple[Array, Array]:
+        if not self.height:
+            return np.ones_like(s), np.zeros_like(s)
+        return np.cos(s / self._radius), -math.copysign(1.0, self.height) * np.sin(s / self._radius)
+
+    def supports(self) -> tuple[Support, Support]:
+        return POLE, SUPPORTS[self.rim]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere(_Graded):
+    """Sphere of unit radius, from the upper pole to the lower: R = sin s, Z = cos s, 0 <= s <= pi.
+
+    Parameters
+    ----------
+    elements, ratio : int, float
+        Number of elements, and the size of that at the lower pole over that of that at the upper one.
+
+    Raises
+    ------
+    InputError
+    """
+
+    @property
+    def shape(self) -> str:
+        return "sphere"
+
+    @property
+    def stop(self) -> float:
+        return math.pi
+
+    def position(self, s: Array) -> tuple[Array, Array]:
+        return np.sin(np.minimum(s, math.pi - s)), np.cos(s)  # exactly 0 at both poles
+
+    def tangent(self, s: Array) -> tuple[Array, Array]:
+        return np.cos(s), -np.sin(np.minimum(s, math.pi - s))
+
+    def supports(self) -> tuple[Support, Support]:
+        return POLE, POLE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(_Graded):
+    """Tube of unit radius about the axis, from the top down: R = 1, Z = length/2 - s, 0 <= s <= length.
+
+    Parameters
+    ----------
+    length : float
+        Over R0, the radius.
+    elements, ratio : int, float
+        Number of elements, and the size of the lowest over that of the topmost.
+    top, bottom : str
+        How the ends are held, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
+
+    Raises
+    ------
+    InputError
+    """
+
+    length: float
+    top: str = "clamped"
+    bottom: str = "clamped"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _convert(self, "length", above=0, below=1e6)
+
+    @property
+    def shape(self) -> str:
+        return "cylinder"
+
+    @property
+    def stop(self) -> float:
+        return self.length
+
+    def position(self, s: Array) -> tuple[Array, Array]:
+        return np.ones_like(s), self.length / 2 - s
+
+    def tangent(self, s: Array) -> tuple[Array, Array]:
+        return np.zeros_like(s), -np.ones_like(s)
+
+    def supports(self) -> tuple[Support, Support]:
+        return SUPPORTS[self.top], SUPPORTS[self.bottom]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Torus:
+    """Torus with a round tube of unit radius: R = aspect + sin s, Z = cos s, 0 <= s <= 2 pi, closed, from the top of the tube outwards.
+
+    Parameters
+    ----------
+    aspect : float
+        Radius of the circle through the middle of the tube over that of the tube, R0; > 1.
+    elements : int
+        Number of elements around the tube, all equal; at least 3.
+
+    Raises
+    ------
+    InputError
+    """
+
+    aspect: float
+    elements: int = ELEMENTS
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "elements", check_elements(self.elements, 3))
+        _convert(self, "aspect", above=1, below=1e9)
+
+    @property
+    def shape(self) -> str:
+        return "torus"
+
+    def breakpoints(self) -> Array:
+        return 2 * math.pi * np.linspace(0.0, 1.0, self.elements + 1)
+
+    def position(self, s: Array) -> tuple[Array, Array]:
+        return self.aspect + np.sin(s), np.cos(s)
+
+    def tangent(self, s: Array) -> tuple[Array, Array]:
+        return np.cos(s), -np.sin(s)
+
+    def with_elements(self, elements: int) -> Self:
+        """The same shape with another number of elements."""
+        return replace(self, elements=elements)
+
+    def refined(self) -> Self:
+        return self.with_elements(2 * self.elements)
+
+    def supports(self) -> tuple[()]:
+        return ()
+
+
+def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: str = "hub", outer: str = "clamped") -> Annulus:
+    """Mesh of a flat ring; see :class:`Annulus`."""
+    return Annulus(inner_radius=inner_radius, elements=elements, ratio=ratio, inner=inner, outer=outer)
+
+
+def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: str = "clamped") -> Cap:
+    """Mesh of a spherical cap; see :class:`Cap`."""
+    return Cap(height=height, elements=elements, ratio=ratio, rim=rim)
+
+
+def sphere(elements: int = ELEMENTS, ratio: float = 1.0) -> Sphere:
+    """Mesh of a closed sphere; see :class:`Sphere`."""
+    return Sphere(elements=elements, ratio=ratio)
+
+
+def cylinder(length: float, elements: int = ELEMENTS, ratio: float = 1.0, top: str = "clamped", bottom: str = "clamped") -> Cylinder:
+    """Mesh of a tube; see :class:`Cylinder`."""
+    return Cylinder(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom)
+
+
+def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
+    """Mesh of a torus; see :class:`Torus`."""
+    return Torus(aspect=aspect, elements=elements)
+
+
+def _convert(mesh: Any, name: str, *, above: float, below: float) -> None:
+    """Turn an argument into a float between two bounds, or raise InputError."""
+    value = getattr(mesh, name)
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not above < float(value) < below:
+        raise InputError(f"mesh.{name}", value, f"a number between {above:g} and {below:g} is allowed (in units of R0)")
+    object.__setattr__(mesh, name, float(value))

@@ -1,0 +1,81 @@
+"""Eigenvalues of a membrane that can move as a whole: those of the motions that are left when rigid ones are taken out.
+
+With T the rigid motions, K T = 0, the others are orthogonal to T in the mass M. The unknowns hold one node so that K is regular; a motion y
+of theirs stands for y less its rigid part, y - T (T^T M T)^-1 T^T M y, which has the same K and the mass::
+
+    M' = M - U U^T,        U = M T (T^T M T)^(-1/2)
+
+so that K phi = lambda M' phi has all of the free membrane's eigenvalues but the zeros. K - lambda M' is a band matrix plus lambda U U^T.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..potential import Array
+from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from .spectrum import Pencil
+
+
+class FloatingPencil(Pencil):
+    """K - lambda (M - U U^T), with a constraint if given.
+
+    Parameters
+    ----------
+    band, mass, kd, constraint, compliance
+        As for :class:`.spectrum.Pencil`.
+    rigid : ndarray, shape (n, k)
+        U, see :func:`rigid_part`.
+    """
+
+    banded = False
+
+    def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float, rigid: Array) -> None:
+        super().__init__(band, mass, kd, constraint, compliance)
+        self.rigid = rigid
+
+    def times_mass(self, mode: Array) -> Array:
+        return band_product(self.mass, self.kd, mode) - self.rigid @ (self.rigid.T @ mode)
+
+    def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
+        if not shift:
+            return super().shifted_solver(shift)
+        factor = _RankFactor(BandFactor(self.band - shift * self.mass), self.rigid, shift)
+        return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, -self.compliance)
+
+    def count(self, shift: float) -> int:
+        """Number of eigenvalues below a shift: the inertia of the band matrix and, by Haynsworth's additivity, of its borders."""
+        if not shift:
+            return super().count(shift)
+        band = self.band - shift * self.mass
+        borders, corners = self.rigid, np.full(self.rigid.shape[1], -1 / shift)
+        if self.constraint is not None:
+            borders, corners = np.column_stack([borders, self.constraint]), np.append(corners, -self.compliance)
+        schur = np.diag(corners) - borders.T @ BandFactor(band).solve(np.asfortranarray(borders))
+        own = int((corners < 0).sum()) + int(self.constraint is not None and self.compliance == 0)
+        return negative_directions(band, self.kd) + int((np.linalg.eigvalsh((schur + schur.T) / 2) < 0).sum()) - own
+
+
+class _RankFactor(BandFactor):
+    """Solver for A + shift U U^T from factors of A (Woodbury)."""
+
+    def __init__(self, factor: BandFactor, rigid: Array, shift: float) -> None:
+        self._factor, self._rigid = factor, rigid
+        self._columns = factor.solve(np.asfortranarray(rigid))
+        self._inner = np.linalg.inv(np.eye(rigid.shape[1]) / shift + rigid.T @ self._columns)
+
+    def solve(self, right: Array) -> Array:
+        solution = self._factor.solve(right)
+        return solution - self._columns @ (self._inner @ (self._rigid.T @ solution))
+
+
+def rigid_part(product: Array, gram: Array) -> Array:
+    """U of rigid motions, from M T at the unknowns, shape (n, k), and T^T M T."""
+    return np.linalg.solve(np.linalg.cholesky(gram), product.T).T
+
+
+def pencil_of(band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float, rigid: Array | None) -> Pencil:
+    """The pencil of a membrane that is held, or with ``rigid`` motions taken out."""
+    if rigid is None:
+        return Pencil(band, mass, kd, constraint, compliance)
+    return FloatingPencil(band, mass, kd, constraint, compliance, rigid)

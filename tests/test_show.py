@@ -12,7 +12,6 @@ import pytest
 
 import femmembrane as fm
 from femmembrane.cli import main
-from femmembrane.discretization.meridian import disc
 from femmembrane.physics.outline import Outline
 from femmembrane.stability.zones import KINDS
 from femmembrane.views import movie, picture, show, stage
@@ -137,10 +136,13 @@ def test_any_source_is_drawn_as_it_says() -> None:
     assert dipole.near == (Outline("dipole at height 4.5", ((0.0, 4.5),), 1),)
 
 
-def test_clamped_ends_are_those_of_the_supports(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clamped_ends_are_those_of_the_supports() -> None:
     assert stage.clamped_ends(branch()[0], 17) == [(16, 1.0, 0.0)]
-    monkeypatch.setattr(type(disc()), "supports", lambda self: (frozenset({"u"}), frozenset({"w"})))
-    assert stage.clamped_ends(branch()[0], 17) == []
+    balloon = fm.Scene(fm.NeoHookean(), fm.sphere(elements=4))
+    assert stage.clamped_ends(fm.equilibrium(balloon, volume=5.0), 17) == []
+    tube = fm.Scene(fm.NeoHookean(), fm.cylinder(elements=4, length=2.0, top="hub"))
+    ends = stage.clamped_ends(fm.equilibrium(tube, volume=7.0), 17)
+    assert [end for end, _, _ in ends] == [16]
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,10 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import active_children
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from femmembrane.results.kept import Kept
 from femmembrane.verbs import pool
 from femmembrane.verbs.keys import set_key, values_of
 from femmembrane.verbs.quantities import QUANTITIES, UNEXPECTED, Options, Row, compute
+from femmembrane.verbs.sweep import KEPT
 
 from .cases import disc_scene
 
@@ -326,6 +329,32 @@ def test_a_cluster_of_which_a_worker_is_killed(plain):
         found = fm.sweep(below(), wide(), direction=-1, scheduler=cluster.scheduler_address, on_scene=kill)
     assert seen == list(range(13))
     assert same(found, plain)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks for processes in /proc")
+def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on(tmp_path):
+    below().to_toml(tmp_path / "scene.toml")
+    ways = ["--over", f"{STRENGTH}=60:300:40", "--direction", "-1", "--workers", "2", "--out", str(tmp_path / "out")]
+    started = subprocess.Popen([sys.executable, "-m", "femmembrane", "sweep", str(tmp_path / "scene.toml"), *ways])
+    kept = tmp_path / "out" / f"{KEPT}-wal"
+    until(lambda: kept.exists() and kept.stat().st_size > 40_000)
+    processes = Path(f"/proc/{started.pid}/task/{started.pid}/children").read_text().split()
+    assert len(processes) >= 2
+    started.kill()
+    started.wait()
+    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in processes))
+    with Kept(tmp_path / "out" / KEPT):
+        pass
+    with sqlite3.connect(tmp_path / "out" / KEPT) as file:
+        (count,) = file.execute("SELECT count(*) FROM scene").fetchone()
+    assert count >= 1
+
+
+def until(holds, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_a_script_without_a_guard_is_told_so(tmp_path):

@@ -310,6 +310,19 @@ def test_processes_one_of_which_is_killed(plain):
     assert same(found, plain)
 
 
+def test_processes_are_started_for_what_is_left(plain, monkeypatch):
+    counts = []
+    monkeypatch.setattr("femmembrane.verbs.sweep._ALONE", 0.0)
+    monkeypatch.setattr(pool, "cores", lambda: 2)
+    monkeypatch.setattr(pool, "on_cores", lambda tasks, workers: counts.append(workers) or pool.here(tasks))
+    assert same(fm.sweep(below(), wide(), direction=-1), plain)
+    assert counts == [2]
+    counts.clear()
+    monkeypatch.setattr("femmembrane.verbs.sweep._ALONE", 1e9)
+    fm.sweep(below(), {STRENGTH: [100.0]}, direction=-1)
+    assert counts == []
+
+
 def test_a_cluster_of_which_a_worker_is_killed(plain):
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None, "silence_logs": 50}
@@ -405,7 +418,7 @@ def test_a_map_names_its_axes_and_hatches_what_is_no_value(tmp_path):
     assert len(hatched) == len(statuses)
     (legend,) = figure.legends
     texts = {t.get_text() for t in legend.get_texts()}
-    assert statuses <= texts
+    assert all(any(text.startswith(status) for text in texts) for status in statuses)
     assert (tmp_path / "map.png").stat().st_size > 10_000
     for show in (["limit_presure.0"], ["limit_pressure"], ["limit_pressure.0"], ["steps.0"], ["status"]):
         with pytest.raises(InputError):

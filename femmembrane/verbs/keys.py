@@ -31,15 +31,15 @@ def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     """
     if not isinstance(key, str) or not all(key.split(".")):
         raise InputError("key", key, "the place of a value in a scene file is allowed, such as mesh.elements or source.0.strength")
-    changed = copy.deepcopy(dict(tables))
+    changed = dict(tables)
     place: Any = changed
     *path, last = key.split(".")
     for depth, name in enumerate(path):
-        place = place.setdefault(name, {}) if isinstance(place, dict) else place[_index(place, key, depth)]
-    if isinstance(place, dict):
-        place[last] = value
-    else:
-        place[_index(place, key, len(path))] = value
+        where = name if isinstance(place, dict) else _index(place, key, depth)
+        inner = copy.copy(place.get(where, {}) if isinstance(place, dict) else place[where])  # what is not on the way is shared
+        place[where] = inner
+        place = inner
+    place[last if isinstance(place, dict) else _index(place, key, len(path))] = value
     return changed
 
 

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import json
 import math
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 OnScene = Callable[[int, int, int], None]
 #: where finished scenes are kept in the folder of a sweep
 KEPT = "scenes.sqlite"
+#: seconds for which a sweep gets on alone, about what it takes to start processes
+_ALONE = 2.0
 #: scenes that are timed for an estimate
 _SAMPLE = 4
 
@@ -175,8 +178,8 @@ def sweep(
     direction : {1, -1}
         For branch, tipping and wrinkling: whether to set out to larger or smaller volumes.
     workers : int, optional
-        Processes on this machine; default one a core, 1 stays in this process. With more than one, a script must call this below
-        ``if __name__ == "__main__":``.
+        Processes on this machine, 1 stays in this one. Default: one a core, started only for what is left after the first two seconds.
+        With more than one, a script must call this below ``if __name__ == "__main__":``.
     scheduler : str, optional
         Address of a running Dask scheduler (``tcp://...``) whose workers compute, in place of this machine.
     out : path, optional
@@ -204,7 +207,7 @@ def sweep(
             on_scene(len(rows), len(grid.distinct), failed)
         tasks = grid.tasks(set(rows))
         missing = len(grid.distinct) - len(rows)
-        for key, row in _computed(tasks, min(workers, missing), scheduler if missing else None):
+        for key, row in _computed(tasks, workers, scheduler) if missing else ():
             rows[key] = row
             failed += not row.values
             _keep(kept, key, row)
@@ -249,7 +252,7 @@ def plan_sweep(
             row = compute(changed, quantity, options)
             seconds += row.seconds
             _keep(kept, key, row)
-    return Plan(len(grid.distinct), len(known), seconds / max(len(chosen), 1), len(chosen), _workers(workers, None))
+    return Plan(len(grid.distinct), len(known), seconds / max(len(chosen), 1), len(chosen), _workers(workers, None) or pool.cores())
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,11 +330,11 @@ def _canonical(value: Any) -> Any:
     return float(value) if isinstance(value, (int, np.number)) and not isinstance(value, bool) else value
 
 
-def _workers(workers: Any, scheduler: Any) -> int:
+def _workers(workers: Any, scheduler: Any) -> int | None:
     if scheduler is not None and not isinstance(scheduler, str):
         raise InputError("scheduler", scheduler, "the address of a Dask scheduler is allowed, such as tcp://host:8786")
     if workers is None:
-        return pool.cores()
+        return None
     if scheduler is not None:
         raise InputError("workers", workers, "not together with scheduler: a cluster has its own")
     if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1:
@@ -339,10 +342,22 @@ def _workers(workers: Any, scheduler: Any) -> int:
     return int(workers)
 
 
-def _computed(tasks: Iterator[pool.Task], workers: int, scheduler: str | None) -> Iterator[tuple[str, Row]]:
+def _computed(tasks: Iterator[pool.Task], workers: int | None, scheduler: str | None) -> Iterator[tuple[str, Row]]:
+    """The rows of tasks by whoever is to compute them; unless told, processes are started for what is left after ``_ALONE`` seconds."""
     if scheduler is not None:
-        return pool.on_cluster(tasks, scheduler)
-    return pool.on_cores(tasks, workers) if workers > 1 else pool.here(tasks)
+        yield from pool.on_cluster(tasks, scheduler)
+    elif workers is None and pool.cores() > 1:
+        end = time.monotonic() + _ALONE
+        for row in pool.here(tasks):
+            yield row
+            if time.monotonic() > end:
+                break
+        for task in tasks:  # one at least is left
+            yield from pool.on_cores(itertools.chain([task], tasks), pool.cores())
+    elif workers is not None and workers > 1:
+        yield from pool.on_cores(tasks, workers)
+    else:
+        yield from pool.here(tasks)
 
 
 def _known(grid: _Grid, kept: Kept | None) -> dict[str, Row]:

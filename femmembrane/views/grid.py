@@ -127,15 +127,17 @@ def _key_label(key: str) -> str:
 
 
 def _reasons(data: Any, values: Array) -> Array:
-    """Why a scene is not plainly a value: its status, or that there is nothing of the kind; empty for the rest."""
+    """Why a scene is not plainly a value: how its branch ended, or that there is nothing of the kind; empty for the rest."""
     status = np.asarray(data["status"].values, dtype=object)
     outcome = np.asarray(data["outcome"].values, dtype=object) if "outcome" in data else np.full(status.shape, "none there", dtype=object)
     good = str(Status.CONVERGED)
     reasons = np.full(status.shape, "", dtype=object)
     missing = ~np.isfinite(values)
-    reasons[missing] = np.where(status[missing] == good, outcome[missing], status[missing])
+    ended = np.array([f"{s}, before there was one" for s in status.ravel()], dtype=object).reshape(status.shape)
+    ended = np.where(np.asarray(data["has_result"].values), ended, status)
+    reasons[missing] = np.where(status == good, outcome, ended)[missing]
     early = ~missing & (status != good)
-    reasons[early] = np.array([f"{s}: the branch ends early" for s in status[early]], dtype=object)
+    reasons[early] = np.array([f"{s}, further on" for s in status[early]], dtype=object)
     return reasons
 
 

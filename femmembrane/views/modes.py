@@ -250,7 +250,10 @@ def _draw_lines(
     lines = [(points[node == circle], True) for circle, _ in circles(surface.rho, surface.eta, ())]
     if meridians:
         turn = np.round(np.arctan2(surface.revolution.sine, surface.revolution.cosine) / (np.pi / 6), 6) % 12
-        axis = points[:1] if np.count_nonzero(node == 0) == 1 else points[:0]
-        lines += [(np.concatenate([axis, points[(turn == k) & (node > 0)]]), False) for k in range(12)]
+        # a pole is one point, of all meridians
+        first, last = (points[node == end] if np.count_nonzero(node == end) == 1 else points[:0] for end in (0, node[-1]))
+        inner = np.isin(node, [end for end, pole in ((0, first), (node[-1], last)) if len(pole)], invert=True)
+        closed = not len(first) and node[-1] < surface.rho.size - 1
+        lines += [(np.concatenate([first, points[(turn == k) & inner], last]), closed) for k in range(12)]
     tubes = [pyvista.lines_from_points(line, close=closed).tube(radius=0.0016 * surface.extent, n_sides=8) for line, closed in lines]
     plotter.add_mesh(pyvista.merge(tubes), color=color, ambient=1.0, diffuse=0.0, name=name, reset_camera=False, render=False)

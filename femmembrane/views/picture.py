@@ -194,6 +194,8 @@ def draw_surface(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float
 
 def circles(rho: Array, eta: Array, ends: Sequence[int], count: int = 6) -> list[tuple[int, float]]:
     """Nodes whose circles are drawn, with their thickness: ends off the axis, and a few at equal distances along the meridian."""
+    if (rho[0], eta[0]) == (rho[-1], eta[-1]) and rho[0] > 0:  # the last node of a closed meridian is the first
+        rho, eta = rho[:-1], eta[:-1]
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(rho), np.diff(eta)))])
     shown = np.searchsorted(length, length[-1] * np.arange(count + 1) / count).clip(max=rho.size - 1)
     thin = [int(node) for node in np.unique(shown) if rho[node] > 1e-9 and node not in ends]

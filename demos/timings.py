@@ -1,7 +1,7 @@
 """What a run costs: the 60-step inflation under a dipole, its set-up, and how both grow with the mesh.
 
-Prints one table. Times are medians of repeated runs in one process, after imports; on a shared machine they scatter by tens of per cent,
-so compare rows with each other rather than with numbers from elsewhere.
+Prints one table. Times are medians of repeated runs in one process, after imports, in seconds of its processor: what others do on a shared
+machine is left out, but not what they do to its caches, so that times scatter by tens of per cent. Compare rows with each other.
 
     python demos/timings.py            all tables, about a minute
     python demos/timings.py --quick    one repetition on small meshes
@@ -44,12 +44,12 @@ def scene(elements: int, degree: int = 2, stability: Sequence[str] = ()) -> fm.S
 
 
 def seconds(work: Callable[[], object], repeat: int) -> float:
-    """Median wall time of repeated calls."""
+    """Median processor time of repeated calls."""
     times = []
     for _ in range(repeat):
-        clock = time.perf_counter()
+        clock = time.process_time()
         work()
-        times.append(time.perf_counter() - clock)
+        times.append(time.process_time() - clock)
     return statistics.median(times)
 
 
@@ -100,10 +100,10 @@ def effects_table(repeat: int) -> None:
     times: dict[str, list[float]] = {name: [] for name in states}
     for _ in range(3 * repeat):  # in turns, so that all see the same neighbours on the machine
         for name, eq in states.items():
-            clock = time.perf_counter()
+            clock = time.process_time()
             for _ in range(100):
                 eq.potential.evaluate(eq.state, eq.pressure)
-            times[name].append((time.perf_counter() - clock) / 100)
+            times[name].append((time.process_time() - clock) / 100)
     print(f"\nEffects, 64 quadratic elements                             {'operations':>10} {'ms each':>8}")
     for name, eq in states.items():
         print(f"  {name:<54} {eq.potential.operations:>12} {statistics.median(times[name]) * 1e3:>8.3f}")
@@ -116,10 +116,10 @@ def growth_table(sizes: Sequence[int], repeat: int) -> None:
     print(f"\nGrowth with the mesh (quadratic elements)              {'set-up s':>10} {'next step s':>12} {'in NumPy':>10}")
     for elements in sizes:
         asked = scene(elements)
-        clock = time.perf_counter()
+        clock = time.process_time()
         potential = Potential(asked)
         potential.evaluate(np.zeros(potential.space.n_free), 0.0)
-        setup = time.perf_counter() - clock
+        setup = time.process_time() - clock
         dome = spherical_dome(potential, 2.0)
         last = correct(potential, VolumeControl(2.0), dome, 1.9, damped=True, max_iterations=30)
 

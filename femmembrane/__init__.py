@@ -18,10 +18,26 @@ if TYPE_CHECKING:
     from .errors import InputError as InputError
     from .errors import SolveError as SolveError
     from .errors import Status as Status
+    from .physics.invariant import ArrudaBoyce as ArrudaBoyce
+    from .physics.invariant import Fung as Fung
+    from .physics.invariant import Gent as Gent
+    from .physics.invariant import Yeoh as Yeoh
+    from .physics.loads import Hydrostatic as Hydrostatic
+    from .physics.loads import Load as Load
+    from .physics.loads import Weight as Weight
     from .physics.magnetics import Dipole as Dipole
+    from .physics.magnetics import Source as Source
+    from .physics.materials import MooneyRivlin as MooneyRivlin
     from .physics.materials import NeoHookean as NeoHookean
     from .physics.materials import Ogden as Ogden
+    from .physics.materials import Varga as Varga
     from .physics.scales import Scales as Scales
+    from .physics.sources import Loop as Loop
+    from .physics.sources import Solenoid as Solenoid
+    from .physics.sources import Uniform as Uniform
+    from .physics.sources import Wire as Wire
+    from .physics.tabulated import Tabulated as Tabulated
+    from .potential import StrainEnergy as StrainEnergy
     from .results.citations import cite as cite
     from .results.records import Branch as Branch
     from .results.records import Equilibrium as Equilibrium
@@ -69,9 +85,14 @@ _ROOMS = {
     "accuracy.error_estimate": ("Deviation", "ErrorEstimate"),
     "discretization.meridian": ("Disc", "disc"),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
-    "physics.magnetics": ("Dipole",),
-    "physics.materials": ("NeoHookean", "Ogden"),
+    "physics.invariant": ("ArrudaBoyce", "Fung", "Gent", "Yeoh"),
+    "physics.loads": ("Hydrostatic", "Load", "Weight"),
+    "physics.magnetics": ("Dipole", "Source"),
+    "physics.materials": ("MooneyRivlin", "NeoHookean", "Ogden", "Varga"),
     "physics.scales": ("Scales",),
+    "physics.sources": ("Loop", "Solenoid", "Uniform", "Wire"),
+    "physics.tabulated": ("Tabulated",),
+    "potential": ("StrainEnergy",),
     "results.citations": ("cite",),
     "results.records": ("Branch", "Equilibrium", "Jump", "SpecialPoint"),
     "results.store": ("load",),

@@ -2,7 +2,7 @@
 
 Only the terms that the scene has are written down, as one CasADi expression at a point in the local variables (u, u_x, w, w_x)::
 
-    E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS],       V = Int rho rho_x eta dx,       both with the 2 pi
+    E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS] + [loads],       V = Int rho rho_x eta dx,       both with the 2 pi
 
 CasADi differentiates it twice, and the instructions of the result are replayed on whole vectors of points, which costs a small part of
 mapping the scalar function over them. Assembly is a constant linear map of the values at the points (:mod:`.discretization.space`), the
@@ -26,12 +26,13 @@ from .discretization.space import HESSIAN_PAIRS, Space, space_of
 from .errors import InputError
 from .native import native
 from .physics.kinematics import hencky_strains
-from .physics.loads import volume_density
-from .physics.magnetics import Source, magnetic_energy_density
+from .physics.loads import over_projection, over_reference, volume_density
+from .physics.magnetics import Source, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
     from ._native import Elements
+    from .physics.loads import Load
     from .physics.materials import Material
     from .scene import Scene
 
@@ -59,6 +60,7 @@ class Evaluation:
     force_density: Array
     stiffness_density: Array
     potential: Potential
+    factor: float = 1.0
     _band: Array | None = None
 
     @property
@@ -69,8 +71,13 @@ class Evaluation:
         return self._band
 
     @property
+    def load_energy(self) -> float:
+        """Energy of the loads at x: computed only when asked for, as no solver needs it."""
+        return self.potential.load_energy(self.x, self.factor)
+
+    @property
     def energy(self) -> float:
-        return self.elastic_energy + self.magnetic_energy
+        return self.elastic_energy + self.magnetic_energy + self.load_energy
 
 
 class Potential:
@@ -89,13 +96,19 @@ class Potential:
         space = self.space
         # a source of no strength is none: nothing of it is built
         self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
+        self.loads = tuple(load for load in scene.loads if load.acts)
         self._flat = not (space.Z.any() or space.Z_x.any())
         columns = [space.R, space.R_x, space.weights] if self._flat else [space.R, space.R_x, space.weights, space.Z, space.Z_x]
         self.point_data: Array = np.stack([c.ravel() for c in columns])
         with _casadi_answers_numpy():
-            self.symbols, self.terms = _point_expressions(scene, self.sources, self._flat)
+            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, self._flat)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
+
+    @property
+    def surrounded(self) -> bool:
+        """Whether anything but the pressure acts on the membrane: without, the flat unloaded state is an equilibrium of no stiffness."""
+        return bool(self.sources or self.loads)
 
     @property
     def material(self) -> Material:
@@ -115,7 +128,7 @@ class Potential:
 
     @cached_property
     def point_function(self) -> ca.Function:
-        """(data, local variables, (P, magnetic factor)) -> values, gradients and the Hessian at one point."""
+        """(data, local variables, (P, factor on sources and loads)) -> values, gradients and the Hessian at one point."""
         t, (data, local, parameters) = self.terms, self.symbols
         hessian = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local)
         rows = [
@@ -157,22 +170,24 @@ class Potential:
         return module.Elements(tape, self.point_data, gather, table, field, space.n_quadrature, n_local, space.half_bandwidth)
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
-        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales the magnetic energy."""
+        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
         elements = self.elements
         if elements is None:
             return self._evaluate(x, pressure, magnetic)
         gradients, densities = self.results()
         values = elements.evaluate(np.ascontiguousarray(x), np.array([pressure, magnetic], dtype=float), gradients, densities)
-        return self.evaluation(x, values, gradients, densities)
+        return self.evaluation(x, values, gradients, densities, magnetic)
 
     def results(self) -> tuple[Array, Array]:
         """Room for the gradients (2, n_free) and the densities (20, n_points) that the compiled elements answer with."""
         return np.empty((2, self.space.n_free)), np.empty((20, self.n_points))
 
-    def evaluation(self, x: Array, values: tuple[float, float, float], gradients: Array, densities: Array) -> Evaluation:
+    def evaluation(
+        self, x: Array, values: tuple[float, float, float], gradients: Array, densities: Array, factor: float = 1.0
+    ) -> Evaluation:
         """What the compiled elements answer, by names."""
         stiffness = densities[8:18].reshape(-1, self.space.n_elements)
-        return Evaluation(x, *values, gradients[0], gradients[1], densities[18:], densities[:8], stiffness, self)
+        return Evaluation(x, *values, gradients[0], gradients[1], densities[18:], densities[:8], stiffness, self, factor)
 
     def assemble_band(self, stiffness_density: Array) -> Array:
         """:meth:`.Space.assemble_band`, compiled where possible."""
@@ -192,7 +207,17 @@ class Potential:
             force_density = out[3:11].copy()
             gradient, volume_gradient = space.assemble_vectors(force_density.reshape(shape))
         stiffness_density = out[11:21].reshape(-1, space.n_elements).copy()
-        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, self)
+        return Evaluation(x, e, m, v, gradient, volume_gradient, out[21:23].copy(), force_density, stiffness_density, self, magnetic)
+
+    def load_energy(self, x: Array, factor: float = 1.0) -> float:
+        """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""
+        if not self.loads:
+            return 0.0
+        return float(self._load_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+
+    @cached_property
+    def _load_kernel(self) -> _Kernel:
+        return _Kernel(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of the pole and of the quadrature points from a source; infinite without sources."""
@@ -205,13 +230,34 @@ class Potential:
         else:
             elements.at_quadrature(np.ascontiguousarray(x), local)
         u, _, w, _ = local
-        rho, eta, pole = space.R + u, space.Z + w, space.center_height(x)
-        return min(math.sqrt(min(s.distance_squared(rho, eta).min(), s.distance_squared(0.0, pole))) for s in self.sources)
+        rho, eta = space.R + u, space.Z + w
+        found = min(math.sqrt(s.distance_squared(rho, eta).min()) for s in self.sources)
+        if not self._pole:
+            return found
+        pole = space.center_height(x)
+        return min(found, *(math.sqrt(s.distance_squared(0.0, pole)) for s in self.sources))
 
     def passed_source(self, before: Array, after: Array) -> bool:
-        """Whether the pole went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
+        """Whether the membrane went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
         heights = self.space.center_height(before), self.space.center_height(after)
-        return any(source.passed(*heights) for source in self.sources)
+        if self._pole and any(source.passed(*heights) for source in self.sources):
+            return True
+        circles = [circle for source in self.sources for circle in source.circles]
+        if not circles:
+            return False
+        meridians = [self._meridian(x) for x in (before, after)]
+        return any(swept(meridians[0], meridians[1], circle) for circle in circles)
+
+    @property
+    def _pole(self) -> bool:
+        """Whether the meridian begins on the axis."""
+        return abs(float(self.space.mesh.position(self.space.mesh.breakpoints()[:1])[0][0])) < 1e-12
+
+    def _meridian(self, x: Array) -> Array:
+        """Positions (rho, eta) of the nodes, shape (2, n)."""
+        s = self.space.node_parameters()
+        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.evaluate(x, s)
+        return np.stack([R + u, Z + w])
 
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
@@ -238,14 +284,14 @@ class Potential:
         return _point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
 
     def field_energy(self, rho: Array, eta: Array) -> Array:
-        """Magnetic energy density per reference area and its derivatives with respect to the position.
+        """Energy density of sources and loads per reference area and its derivatives with respect to the position.
 
         Returns
         -------
         ndarray, shape (6, n)
-            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources.
+            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources and loads.
         """
-        if not self.sources:
+        if not self.surrounded:
             return np.zeros((6, np.size(rho)))
         return _at_points(self._field_energy_function, rho, eta)
 
@@ -253,7 +299,9 @@ class Potential:
     def _field_energy_function(self) -> ca.Function:
         y = ca.SX.sym("y", 2)
         with _casadi_answers_numpy():
-            density = magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
+            density = over_reference(self.loads, y[0], y[1]) + ca.SX(0)
+            if self.sources:
+                density += magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
         hessian, gradient = ca.hessian(density, y)
         return _point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
@@ -290,7 +338,7 @@ class Family(Potential):
         number = ca.SX.sym("number")
         with _casadi_answers_numpy():
             super().__init__(vary(number), quadrature)
-        self.scene, self.sources = scene, scene.sources
+        self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
@@ -313,6 +361,74 @@ class Family(Potential):
         out = self._fold_kernel(local, np.array([pressure, number, q]))
         cubic, force = (space.assemble_vector(rows.reshape(-1, ne)) for rows in (out[:4], out[6:]))
         return FoldDerivatives(cubic, float(out[4].sum()), float(out[5].sum()), force)
+
+
+@dataclass(frozen=True)
+class StrainEnergy:
+    """A strain energy of one's own; it has no name in scene files.
+
+    Stress and tangent are the exact derivatives by CasADi. They keep the digits that the function keeps: a difference of numbers of order
+    one leaves round-off of 1e-16 mu in the stress, too coarse for a nearly flat membrane (strains below 1e-8), not for any other.
+
+    Parameters
+    ----------
+    function : callable
+        W(lambda_1, lambda_2) of an isotropic incompressible membrane in units of the shear modulus: arithmetic and NumPy's ufuncs, which
+        act on arrays and CasADi symbols alike (``np.where`` does not).
+
+    Raises
+    ------
+    InputError
+        For a function that does not accept symbols, is not 0 and free of stress at rest, is not symmetric in the two stretches, or whose
+        shear modulus is not 1.
+    """
+
+    function: Callable[[Any, Any], Any]
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise InputError("material.function", self.function, "a function of the stretches (lambda_1, lambda_2) is allowed")
+        try:
+            rest, there, mirrored = _at_points(_derivatives(self.function), np.array([0, 0.2, 0.1]), np.array([0, 0.1, 0.2])).T
+        except Exception as error:  # whatever a stranger's function raises
+            what = f"it must accept symbols ({type(error).__name__}: {error}); use arithmetic and NumPy's ufuncs"
+            raise InputError("material.function", self.function, what) from error
+        if not np.allclose(rest[:3], 0, atol=1e-10):
+            found = ", ".join(f"{v:.6g}" for v in rest[:3])
+            raise InputError("material.function", self.function, f"W and both stresses must be 0 at rest, not {found}")
+        if not np.allclose(there, mirrored[[0, 2, 1, 5, 4, 3]], rtol=1e-8):
+            raise InputError("material.function", self.function, "it must be symmetric in the two stretches (isotropic)")
+        if not np.allclose(rest[3:], [4, 2, 4], rtol=1e-6):
+            what = f"the shear modulus must be 1, not {rest[4] / 2:.9g}; divide W by it (W = 2 (e1^2 + e1 e2 + e2^2) at small log strains)"
+            raise InputError("material.function", self.function, what)
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        return self.function(np.exp(e1), np.exp(e2))
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        s1, s2 = self._rows(e1, e2)[1:3]
+        return s1, s2
+
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+        s11, s12, s22 = self._rows(e1, e2)[3:]
+        return s11, s12, s22
+
+    def _rows(self, e1: Any, e2: Any) -> list[Any]:
+        function = _derivatives(self.function)
+        if isinstance(e1, ca.SX) or isinstance(e2, ca.SX):
+            return list(ca.vertsplit(function(ca.vertcat(e1, e2))))
+        e1, e2 = np.broadcast_arrays(np.asarray(e1, dtype=float), np.asarray(e2, dtype=float))
+        return [row.reshape(e1.shape) for row in _at_points(function, e1, e2)]
+
+
+@lru_cache(maxsize=64)
+def _derivatives(function: Callable[[Any, Any], Any]) -> ca.Function:
+    """(e_1, e_2) -> W, s_1, s_2, and the second derivatives with respect to the Hencky strains."""
+    e = ca.SX.sym("e", 2)
+    with _casadi_answers_numpy():
+        energy = function(np.exp(e[0]), np.exp(e[1]))
+    hessian, gradient = ca.hessian(energy, e)
+    return _point_rows([e], [energy, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
 
 class _Kernel:
@@ -457,7 +573,9 @@ def _potential_of(scene: Scene) -> Potential:
     return Potential(scene)
 
 
-def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
+def _point_expressions(
+    scene: Scene, sources: Sequence[Source], loads: Sequence[Load], flat: bool
+) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
     """Symbols (data, local, parameters) and the weighted densities with their gradients at one point."""
     data = ca.SX.sym("data", 3 if flat else 5)
     local = ca.SX.sym("local", 4)
@@ -481,9 +599,16 @@ def _point_expressions(scene: Scene, sources: Sequence[Source], flat: bool) -> t
         magnetic = parameters[1] * magnetic
         second, first = ca.hessian(magnetic, local)
         gradient, hessian = gradient + first, hessian + second
+    load = ca.SX(0)
+    if loads:
+        load = area * over_reference(loads, R + u, Z + w) + weight * (R + u) * (R_x + u_x) * over_projection(loads, Z + w)[0]
+        load = parameters[1] * load
+        second, first = ca.hessian(load, local)
+        gradient, hessian = gradient + first, hessian + second
     return (data, local, parameters), {
         "elastic": area * material.energy(e1, e2),
         "magnetic": magnetic,
+        "load": load,
         "volume": volume,
         "gradient": gradient,
         "hessian": hessian,

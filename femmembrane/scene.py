@@ -6,13 +6,14 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [material]  model, ...       a class of MATERIALS and its arguments
     [membrane]                   attributes of Scene, listed in SCENE_KEYS
     [[source]]  kind, ...        a class of SOURCES and its arguments
+    [[load]]    kind, ...        a class of LOADS and its arguments
     [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
     [effects]                    attributes of Scene that are on or off
     [run]                        Run
     [analysis]                   Analysis
     [scales]                     Scales
 
-A new model, source or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
+A new model, source, load or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
 Values are checked where the objects are made, so that files and Python code meet the same errors, named by their key in a file.
 """
 
@@ -34,12 +35,33 @@ from numpy.typing import NDArray
 
 from .discretization.meridian import Disc, Meridian, disc
 from .errors import InputError, unknown_name
-from .physics.magnetics import Dipole, Source
-from .physics.materials import Material, NeoHookean, Ogden
+from .physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
+from .physics.loads import Hydrostatic, Load, Weight
+from .physics.magnetics import Dipole, Source, distance_to_polyline
+from .physics.materials import Material, MooneyRivlin, NeoHookean, Ogden, Varga
 from .physics.scales import AGREEMENT, Scales
+from .physics.sources import Loop, Solenoid, Uniform, Wire
+from .physics.tabulated import Tabulated
 
-MATERIALS: dict[str, Any] = {"neo-hookean": NeoHookean, "ogden": Ogden}
-SOURCES: dict[str, Any] = {"dipole": Dipole}
+MATERIALS: dict[str, Any] = {
+    "arruda-boyce": ArrudaBoyce,
+    "fung": Fung,
+    "gent": Gent,
+    "mooney-rivlin": MooneyRivlin,
+    "neo-hookean": NeoHookean,
+    "ogden": Ogden,
+    "varga": Varga,
+    "yeoh": Yeoh,
+}
+SOURCES: dict[str, Any] = {
+    "dipole": Dipole,
+    "loop": Loop,
+    "solenoid": Solenoid,
+    "tabulated": Tabulated,
+    "uniform": Uniform,
+    "wire": Wire,
+}
+LOADS: dict[str, Any] = {"hydrostatic": Hydrostatic, "weight": Weight}
 SHAPES: dict[str, Any] = {"disc": Disc}
 CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
@@ -227,7 +249,7 @@ class Scene:
     degree : int
         Polynomial degree of the elements, 1 to 8; left out: 2, or as chosen with a mesh for an accuracy (None until then).
     sources : sequence of Source
-        Magnetic sources on the axis; none: nothing magnetic is built.
+        Magnetic sources around the axis; none: nothing magnetic is built.
     susceptibility : float, optional
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
     radius_to_thickness : float, optional
@@ -240,6 +262,8 @@ class Scene:
     analysis : Analysis
     scales : Scales, optional
         Physical size and stiffness: stresses and pressures are then given in Pa as well. They change no equilibrium.
+    loads : sequence of Load
+        Loads besides the pressure, such as ``Hydrostatic(gamma=...)``; none: nothing of them is built.
 
     Raises
     ------
@@ -259,6 +283,7 @@ class Scene:
     run: Run | None = None
     analysis: Analysis = field(default_factory=Analysis)
     scales: Scales | None = None
+    loads: tuple[Load, ...] = ()
 
     def __post_init__(self) -> None:
         _require("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -266,12 +291,21 @@ class Scene:
         _require("run", self.run, () if self.run is None else ("loads",), "a Run is allowed")
         _require("analysis", self.analysis, ("stability", "azimuthal_modes", "wrinkling"), "an Analysis is allowed")
         sources = _sequence("source", self.sources, "a list of sources is allowed, such as [Dipole(strength=..., height=...)]")
+        loads = _sequence("load", self.loads, "a list of loads is allowed, such as [Weight(weight=...)]")
+        for k, load in enumerate(loads):
+            _require(
+                _item_path("load", k, len(loads)),
+                load,
+                ("over_reference", "over_projection"),
+                "a load is allowed, such as Weight(weight=...)",
+            )
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _require("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
         _convert(
             self,
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
+            loads=loads,
             susceptibility=_optional(_susceptibility, "membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=_switch("effects.tension_field", self.tension_field),
@@ -282,14 +316,18 @@ class Scene:
     def _check_sources(self) -> None:
         R, Z = self.mesh.position(self.mesh.breakpoints())
         for k, source in enumerate(self.sources):
-            path = _source_path(k, len(self.sources))
-            _require(path, source, ("field",), "a source is allowed, such as Dipole(strength=..., height=...)")
-            # sources stand on the axis, which a meridian meets at its ends only: its breakpoints are enough
+            path = _item_path("source", k, len(self.sources))
+            allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
+            _require(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "refusal"), allowed)
+            # the axis is met at the ends of a meridian only: its breakpoints are enough; circles may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
-            if not finite:
-                height = getattr(source, "height", source)
-                raise InputError(f"{path}.height", height, f"{_no_field(height)}; move it")
+            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in source.circles)
+            if touched or not finite:
+                name, reason = source.refusal
+                if not touched and _too_far(source):
+                    reason = "the source is too far away for its field to be a number; move it"
+                raise InputError(f"{path}.{name}", getattr(source, name, source), reason)
         if self.sources and self.susceptibility is None:
             raise InputError(
                 "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"
@@ -335,6 +373,7 @@ class Scene:
             "material": _describe("material", "model", MATERIALS, self.material),
             **{table: {name: getattr(self, name) for name in names} for table, names in SCENE_KEYS.items() if table != "mesh"},
             "source": [_describe("source", "kind", SOURCES, source) for source in self.sources],
+            "load": [_describe("load", "kind", LOADS, load) for load in self.loads],
             "mesh": {**_describe("mesh", "shape", SHAPES, self.mesh), **{name: getattr(self, name) for name in SCENE_KEYS["mesh"]}},
             "run": _arguments(self.run) if self.run else {},
             "analysis": {name: value for name, value in _arguments(self.analysis).items() if value is not False},
@@ -360,14 +399,15 @@ class Scene:
         if not isinstance(data, Mapping):
             raise InputError("scene", data, "a mapping of the tables of a scene file is allowed")
         _refuse_unknown("", data, ("title", *_known_keys()))
-        tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name != "source"}
+        tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name not in ("source", "load")}
         arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
         for table in SCENE_KEYS.keys() - {"mesh"}:
             _refuse_unknown(table, tables[table], SCENE_KEYS[table])
         scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
         return cls(
             material=_build_one_of("material", "model", MATERIALS, tables["material"]),
-            sources=_build_sources(data.get("source", ()), scales),
+            sources=_build_list("source", SOURCES, data.get("source", ()), scales),
+            loads=_build_list("load", LOADS, data.get("load", ())),
             mesh=_build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **tables["mesh"]}, beside=SCENE_KEYS["mesh"]),
             run=_build("run", Run, tables["run"]) if "run" in data else None,
             analysis=_build("analysis", Analysis, tables["analysis"]),
@@ -445,6 +485,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys = {table: set(names) for table, names in SCENE_KEYS.items()}
     keys["material"] = {"model"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind"} | arguments(*SOURCES.values())
+    keys["load"] = {"kind"} | arguments(*LOADS.values())
     keys["mesh"] |= {"shape"} | arguments(*SHAPES.values())
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
 
@@ -482,32 +523,32 @@ def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: 
     return _build(path, registry[table[selector]], table, (selector, *beside))
 
 
-def _build_sources(tables: Any, scales: Scales | None) -> tuple[Source, ...]:
+def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Scales | None = None) -> tuple[Any, ...]:
     if isinstance(tables, Mapping):
-        raise InputError("source", tables, "a list of tables is allowed: write [[source]], one for each source")
-    tables = _sequence("source", tables, "a list of tables is allowed: [[source]], one for each source")
-    sources = []
+        raise InputError(name, tables, f"a list of tables is allowed: write [[{name}]], one for each {name}")
+    tables = _sequence(name, tables, f"a list of tables is allowed: [[{name}]], one for each {name}")
+    items = []
     for k, table in enumerate(tables):
-        path = _source_path(k, len(tables))
+        path = _item_path(name, k, len(tables))
         if not isinstance(table, Mapping):
-            raise InputError(path, table, "a table is allowed: [[source]] with its keys below")
+            raise InputError(path, table, f"a table is allowed: [[{name}]] with its keys below")
         if table.get("kind") == "dipole" and scales is not None and scales.dipole_moment is not None:
             table = {"strength": scales.strength, **table}  # only in place of one that is left out
         try:
-            sources.append(_build_one_of(path, "kind", SOURCES, table))
-        except InputError as error:  # a source does not know its place in the list
-            raise InputError(re.sub(r"^source(?=\.)", path, error.key), error.value, error.allowed) from None
-    return tuple(sources)
+            items.append(_build_one_of(path, "kind", registry, table))
+        except InputError as error:  # it does not know its place in the list
+            raise InputError(re.sub(rf"^{name}(?=\.)", path, error.key), error.value, error.allowed) from None
+    return tuple(items)
 
 
-def _no_field(height: Any) -> str:
-    if isinstance(height, float) and abs(height) > 1:
-        return "the source is too far away for its field to be a number"
-    return "the source lies on the membrane, where its field is singular"
+def _too_far(source: Source) -> bool:
+    """Whether a field that is not finite is that of a source beyond the range of numbers, not of one on the membrane."""
+    height = getattr(source, "height", 0.0)
+    return isinstance(height, float) and abs(height) > 1
 
 
-def _source_path(index: int, count: int) -> str:
-    return "source" if count == 1 else f"source[{index}]"
+def _item_path(name: str, index: int, count: int) -> str:
+    return name if count == 1 else f"{name}[{index}]"
 
 
 def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any) -> dict[str, Any]:

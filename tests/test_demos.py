@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import importlib
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -36,6 +38,32 @@ def test_script(script: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
         assert picture.stat().st_size > 10_000, picture
 
 
+def test_gallery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every figure of the paper, each with its own checks, on one page that needs nothing beside it; the README has what it finds."""
+    monkeypatch.syspath_prepend(str(DEMOS / "paper"))
+    gallery = importlib.import_module("gallery")
+    readme = tmp_path / "README.md"
+    current = (DEMOS.parent / "README.md").read_text(encoding="utf-8")
+    readme.write_text(current, encoding="utf-8")
+    gallery.main(["--out", str(tmp_path / "out"), "--readme", str(readme)])
+    assert capsys.readouterr().err == ""
+    assert readme.read_text(encoding="utf-8") == current
+    assert current.count("\n| 6a |") == 1
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert [f"figure-{n}" for n in range(3, 11)] == re.findall(r'<h2 id="([^"]*)">', page)
+    assert set(re.findall(r'src="([^,]*),', page)) == {"data:image/png;base64"}
+    assert page.count("<img") == len(list((tmp_path / "out").glob("*/*.png"))) == 9
+
+
+def test_figure_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A figure is a script of its own."""
+    monkeypatch.syspath_prepend(str(DEMOS / "paper"))
+    monkeypatch.setattr(sys, "argv", ["figure_7.py", "--out", str(tmp_path / "out")])
+    runpy.run_path(str(DEMOS / "paper" / "figure_7.py"), run_name="__main__")
+    assert "wrinkled part shrinks as V rises" in capsys.readouterr().out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"figure-7.csv", "figure-7.png"}
+
+
 @pytest.mark.parametrize("scene", sorted(path.name for path in DEMOS.glob("*.toml")))
 def test_scene_file(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """It reads, says what to compute, and (on a coarse mesh) the command computes it without a word."""
@@ -52,5 +80,6 @@ def test_scene_file(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str
 def test_every_demo_is_listed() -> None:
     """The table of demos/README.md names each script and scene file."""
     listed = (DEMOS / "README.md").read_text(encoding="utf-8")
-    missing = [path.name for path in (*DEMOS.glob("*.py"), *DEMOS.glob("*.toml")) if f"| {path.name} |" not in listed]
+    demos = [*DEMOS.glob("*.py"), *DEMOS.glob("*.toml"), *DEMOS.glob("paper/figure_*.py"), DEMOS / "paper" / "gallery.py"]
+    missing = [path.name for path in demos if f"| {path.relative_to(DEMOS).as_posix()} |" not in listed]
     assert not missing

@@ -152,7 +152,7 @@ def test_field_strength_is_the_published_expression(rho, eta):
 def test_field_is_free_of_divergence_and_curl(rho, eta):
     """div h = (rho h_rho),rho/rho + h_z,z = 0 and curl h = h_rho,z - h_z,rho = 0, by central differences."""
     source, d = fm.Dipole(1.0, 4.0), 1e-4
-    scale = np.hypot(*source.field(rho, eta)) / np.sqrt(source.distance_squared(rho, eta))
+    scale = np.hypot(*source.field(rho, eta)[:2]) / np.sqrt(source.distance_squared(rho, eta))
     right, left, up, down = (source.field(rho + i * d, eta + j * d) for i, j in ((1, 0), (-1, 0), (0, 1), (0, -1)))
     divergence = ((rho + d) * right[0] - (rho - d) * left[0]) / (2 * d * rho) + (up[1] - down[1]) / (2 * d)
     curl = (up[0] - down[0]) / (2 * d) - (right[1] - left[1]) / (2 * d)
@@ -162,7 +162,7 @@ def test_field_is_free_of_divergence_and_curl(rho, eta):
 
 def test_field_on_the_axis():
     """2 sqrt(M)/|z|^3, along the moment."""
-    assert fm.Dipole(4.0, 3.0).field(0.0, 1.0) == (0.0, pytest.approx(2 * 2 / 8))
+    assert fm.Dipole(4.0, 3.0).field(0.0, 1.0) == (0.0, pytest.approx(2 * 2 / 8), 0.0)
     assert fm.Dipole(4.0, 3.0, orientation=-1).field(0.0, 1.0)[1] == pytest.approx(-0.5)
 
 
@@ -170,15 +170,28 @@ def test_fields_superpose():
     one, other = fm.Dipole(4.0, 3.0), fm.Dipole(1.0, -2.0, orientation=-1)
     total = magnetic_field([one, other], 0.3, 0.4)
     assert total == pytest.approx(np.add(one.field(0.3, 0.4), other.field(0.3, 0.4)))
-    assert magnetic_field([], 0.3, 0.4) == (0, 0)
+    assert magnetic_field([], 0.3, 0.4) == (0, 0, 0)
 
 
 # --- total stress
 
 
 def test_total_stress_by_hand():
-    """h along the tangent: (chi + 1/2) h^2 and -h^2/2; along the normal: -(chi + 1/2) h^2 twice; less P T/R0."""
+    """h along the tangent: (chi + 1/2) h^2 and -h^2/2; along the normal: -(chi + 1/2) h^2 twice; less P T/R0.
+
+    Around the axis the two directions change places: -h^2/2 and (chi + 1/2) h^2.
+    """
     tangent = (0.6, 0.8)
-    along, across = (0.6 * 2, 0.8 * 2), (-0.8 * 2, 0.6 * 2)
+    along, across, around = (0.6 * 2, 0.8 * 2, 0.0), (-0.8 * 2, 0.6 * 2, 0.0), (0.0, 0.0, 2.0)
     assert total_stress((1.0, 2.0), 3.0, 1000.0, along, tangent, 2.5) == pytest.approx((1 - 0.003 + 3 * 4, 2 - 0.003 - 2))
     assert total_stress((1.0, 2.0), 3.0, 1000.0, across, tangent, 2.5) == pytest.approx((1 - 0.003 - 3 * 4, 2 - 0.003 - 2 - 10))
+    assert total_stress((1.0, 2.0), 3.0, 1000.0, around, tangent, 2.5) == pytest.approx((1 - 0.003 - 2, 2 - 0.003 + 3 * 4))
+
+
+def test_total_stress_is_that_of_maxwell_and_the_magnetisation():
+    """The diagonal of chi (h h - h_n^2) + h h - |h|^2/2, for a field with all three components."""
+    t, nu, chi = np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0]), 2.5
+    h = np.array([0.7, -1.1, 0.4])  # rho, z, theta
+    stress = chi * (np.outer(h, h) - (h @ nu) ** 2 * np.eye(3)) + np.outer(h, h) - h @ h / 2 * np.eye(3)
+    found = total_stress((0.0, 0.0), 0.0, 1.0, tuple(h), (0.6, 0.8), chi)
+    assert found == pytest.approx((t @ stress @ t, stress[2, 2]))

@@ -118,3 +118,15 @@ def test_inflating_without_the_source_may_pass_where_it_will_be():
     small = start_at_volume(potential_of(disc_scene(fm.NeoHookean(), elements=16)), 10.0)
     last = march(potential, small, VolumeControl, 10.0, 60.0, magnetic=0.0)[-1]
     assert potential.space.center_height(last.x) > 3.0
+
+
+@pytest.mark.parametrize("control", ["volume", "pressure", "center_height"])
+def test_an_equilibrium_of_another_scene_is_a_start(control):
+    """Corrected in the new scene it has another load than it had: the load asked for is reached all the same, from either."""
+    other = fm.equilibrium(below(strength=200.0), volume=1.5)
+    load = getattr(other, control)
+    scene = below(strength=300.0)
+    found = fm.equilibrium(scene, start=other, **{control: load})
+    assert getattr(found, control) == pytest.approx(load, rel=1e-9)
+    assert found.pressure != pytest.approx(other.pressure, rel=1e-6) or found.volume != pytest.approx(other.volume, rel=1e-6)
+    assert found.pressure == pytest.approx(fm.equilibrium(scene, **{control: load}).pressure, rel=1e-8)

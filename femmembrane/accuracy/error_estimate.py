@@ -70,7 +70,7 @@ class ErrorEstimate:
     control : {"volume", "pressure", "height"}
         What is held while the space is refined: its own error is 0.
     pressure, volume, center_height, elastic_energy, magnetic_energy, energy : Deviation
-        ``energy`` is elastic plus magnetic.
+        ``energy`` is elastic, magnetic and load energy together.
     lambda_pressure, lambda_volume : Deviation
         Smallest eigenvalues of the second variation under pressure and volume control.
     method : str

@@ -4,7 +4,8 @@ The tension of the meridian is F = r W_1 (cos phi, sin phi), with phi its angle 
 and with Hencky strains e_i = log lambda_i, its balance of forces is ::
 
     (r W_1)' = W_2 cos phi + r m_t,           r W_1 phi' = -W_2 sin phi + r m_n - P rho lambda_1
-    rho' = lambda_1 cos phi,   eta' = lambda_1 sin phi,     W_i = s_i/lambda_i,     m_t, m_n: the gradient of the magnetic energy density
+    rho' = lambda_1 cos phi,   eta' = lambda_1 sin phi,     W_i = s_i/lambda_i,     m_t, m_n: the gradient of the energy density
+of sources and loads per reference area
 
 Its size is kept through the strain it causes, so that a right-hand side asks the material once and nothing is solved for. The unknowns
 are (e_2, eta, d, phi) with d = e_1 - e_2: at the pole d and phi vanish and everything is smooth, the singular terms are *linear*::
@@ -25,7 +26,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import Disc
 from ..errors import InputError
-from ..physics.magnetics import is_number, magnetic_energy_density
+from ..physics.checks import is_number
+from ..physics.loads import over_projection, over_reference
+from ..physics.magnetics import magnetic_energy_density
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -65,6 +68,7 @@ class StrongForm:
         self.material = scene.material
         self.susceptibility = scene.susceptibility or 0.0
         self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if self.susceptibility else ()
+        self.loads = tuple(load for load in scene.loads if load.acts)
         self.evaluations = 0
 
     def rates(self, r: Any, y: Array, pressure: Any) -> Array:
@@ -84,6 +88,7 @@ class StrongForm:
         s1, s2 = self.material.stress(e1, e2)
         s11, s12, _ = self.material.tangent(e1, e2)
         m_rho, m_eta = self.force(l2 * r, eta)
+        pressure = pressure - over_projection(self.loads, eta)[1]
         # differences of nearly equal numbers at the pole are written so that they keep their digits
         excess = np.expm1(d) * cos - 2 * np.sin(phi / 2) ** 2  # rho'/lambda_2 - 1
         along = (s2 - s1 + s2 * excess) / r + l1 * (m_rho * cos + m_eta * sin)
@@ -126,10 +131,11 @@ class StrongForm:
         )
 
     def force(self, rho: Any, eta: Any) -> tuple[Any, Any]:
-        """Gradient (m_rho, m_eta) of the magnetic energy density."""
-        if not self.sources:
+        """Gradient (m_rho, m_eta) of the energy density of sources and loads per reference area."""
+        if not (self.sources or self.loads):
             return 0.0, 0.0
-        values = self._magnetic(np.array([rho + 1j * _STEP, rho + 0j]), np.array([eta + 0j, eta + 1j * _STEP]))
+        place = np.array([rho + 1j * _STEP, rho + 0j]), np.array([eta + 0j, eta + 1j * _STEP])
+        values = over_reference(self.loads, *place) + (self._magnetic(*place) if self.sources else 0j * place[0])
         gradient = values.imag / _STEP
         return gradient[0], gradient[1]
 
@@ -140,6 +146,7 @@ class StrongForm:
         """(m_eta - P lambda^2)/W_1 at the pole."""
         stress, _ = self.material.stress(e, e)
         _, m_eta = self.force(np.zeros_like(eta), eta)
+        pressure = pressure - over_projection(self.loads, eta)[1]
         return np.exp(e) * (m_eta - pressure * np.exp(2 * e)) / stress
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..physics.magnetics import is_number
+from ..physics.checks import is_number
 
 Array = NDArray[np.float64]
 

@@ -1,10 +1,111 @@
-"""Work of the inflating pressure."""
+"""Work of the inflating pressure, and loads besides it.
+
+A load is conservative and does not depend on the angle around the axis: its energy, in units of mu T R0^2, is a function f of the position
+per reference area and a function g of the height per area projected onto the plane of the rim::
+
+    E = Int f(rho, eta) R dS + Int g(eta) rho d rho,      both with the 2 pi
+
+so that g acts like the pressure -g'(eta). A new load is a class here with one of the two, and a line in the registry of scenes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
+
+from ..errors import InputError
+from .checks import is_number
 
 
 def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:
     """Integrand of the enclosed volume over 2 pi: V = 2 pi Int rho rho_s eta ds, signed (paper eq. 17)."""
     return rho * rho_s * eta
+
+
+class Load:
+    """A load besides the pressure: no load at all, unless a method says otherwise."""
+
+    @property
+    def acts(self) -> bool:
+        """Whether there is anything to build."""
+        return True
+
+    def over_reference(self, rho: Any, eta: Any) -> Any:
+        """f(rho, eta): energy per reference area."""
+        return 0.0
+
+    def over_projection(self, eta: Any) -> tuple[Any, Any, Any]:
+        """(g, g', g'') at a height: energy per projected area with its derivatives."""
+        return 0.0, 0.0, 0.0
+
+
+@dataclass(frozen=True)
+class Hydrostatic(Load):
+    """A liquid that fills the membrane up to the plane of the rim and beyond.
+
+    P is the pressure at the height of the rim, and P - gamma eta that at the height eta: E = gamma Int eta dV.
+
+    Parameters
+    ----------
+    gamma : float
+        rho g R0^2/(mu T), rho the density of the liquid less that of what is outside; negative where the liquid is lighter.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite.
+    """
+
+    gamma: float
+
+    def __post_init__(self) -> None:
+        if not is_number(self.gamma):
+            raise InputError("load.gamma", self.gamma, "a finite number is allowed (density times gravity, times R0^2/(mu T))")
+
+    @property
+    def acts(self) -> bool:
+        return not (is_number(self.gamma) and self.gamma == 0)  # a symbol acts
+
+    def over_projection(self, eta: Any) -> tuple[Any, Any, Any]:
+        return self.gamma / 2 * eta**2, self.gamma * eta, self.gamma
+
+
+@dataclass(frozen=True)
+class Weight(Load):
+    """The weight of the membrane itself: E = w Int eta R dS.
+
+    Parameters
+    ----------
+    weight : float
+        w = rho_m g R0/mu, rho_m the mass density of the membrane; it pulls downwards, against the axis, when positive.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite.
+    """
+
+    weight: float
+
+    def __post_init__(self) -> None:
+        if not is_number(self.weight):
+            raise InputError("load.weight", self.weight, "a finite number is allowed (mass density times gravity, times R0/mu)")
+
+    @property
+    def acts(self) -> bool:
+        return not (is_number(self.weight) and self.weight == 0)
+
+    def over_reference(self, rho: Any, eta: Any) -> Any:
+        return self.weight * eta
+
+
+def over_reference(loads: Iterable[Load], rho: Any, eta: Any) -> Any:
+    """Sum of f of all loads."""
+    return sum(load.over_reference(rho, eta) for load in loads)
+
+
+def over_projection(loads: Iterable[Load], eta: Any) -> tuple[Any, Any, Any]:
+    """Sums of (g, g', g'') of all loads."""
+    parts = [load.over_projection(eta) for load in loads]
+    return sum(p[0] for p in parts), sum(p[1] for p in parts), sum(p[2] for p in parts)

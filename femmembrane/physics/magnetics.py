@@ -1,4 +1,4 @@
-"""Magnetic sources on the axis and the energy of a weakly magnetisable membrane in their field.
+"""Magnetic sources around the axis and the energy of a weakly magnetisable membrane in their field.
 
 Fields are in units of D/R0^3 with D^2 = mu R0^6/mu0, so that |h|^2 is in units of the shear modulus and a source of strength
 M = mu0 D^2/(R0^6 mu) contributes sqrt(M) times its unit field. Several sources superpose as fields::
@@ -9,33 +9,54 @@ M = mu0 D^2/(R0^6 mu) contributes sqrt(M) times its unit field. Several sources 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from numbers import Real
-from typing import Any, Protocol
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
+from .checks import is_number
 from .outline import Outline
 
+Array = NDArray[np.float64]
 
-class Source(Protocol):
-    """A coaxial magnetic source: everything the rest of the code asks of it."""
 
-    def field(self, rho: Any, eta: Any) -> tuple[Any, Any]:
-        """Magnetic field (h_rho, h_z) at the deformed point (rho, eta), in units of sqrt(mu/mu0)."""
+class Source:
+    """A magnetic source whose field is the same all around the axis: everything the rest of the code asks of it.
+
+    A source needs :meth:`field`; the rest has the answers of a field that is smooth everywhere.
+    """
+
+    #: (radius, height) of circles around the axis on which the field is singular
+    circles: tuple[tuple[float, float], ...] = ()
+    #: argument and advice for a field that is not finite on the undeformed membrane
+    refusal = ("height", "the source lies on the membrane, where its field is singular; move it off")
+
+    def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
+        """Magnetic field (h_rho, h_z, h_theta) at the deformed point (rho, eta), in units of sqrt(mu/mu0)."""
+        raise NotImplementedError
 
     def intensity(self, rho: Any, eta: Any) -> Any:
-        """|h|^2 of this source alone: written out, it costs half of squaring the components."""
+        """|h|^2 of this source alone: where it can be written out, it may cost less than squaring the components."""
+        h_rho, h_z, h_theta = self.field(rho, eta)
+        return h_rho**2 + h_z**2 + h_theta**2
 
     def distance_squared(self, rho: Any, eta: Any) -> Any:
-        """Squared distance from the source, where the field is singular."""
+        """Squared distance from the nearest point where the field is singular, an array; infinite where there is none."""
+        found = np.full(np.shape(rho), np.inf)
+        for a, h in self.circles:
+            found = np.minimum(found, (rho - a) ** 2 + (eta - h) ** 2)
+        return found
 
     def passed(self, before: float, after: float) -> bool:
         """Whether a point on the axis that moved between two heights went through the source."""
+        return False
 
 
 @dataclass(frozen=True)
-class Dipole:
+class Dipole(Source):
     """Point dipole on the axis with its moment along the axis.
 
     Parameters
@@ -58,18 +79,13 @@ class Dipole:
     orientation: int = 1
 
     def __post_init__(self) -> None:
-        if not (is_number(self.strength) and self.strength >= 0):
-            raise InputError("source.strength", self.strength, "a finite number >= 0 is allowed")
-        if not is_number(self.height):
-            raise InputError("source.height", self.height, "a finite number is allowed (in units of R0; negative is below)")
-        if isinstance(self.orientation, bool) or self.orientation not in (1, -1):
-            raise InputError("source.orientation", self.orientation, "1 or -1 is allowed")
+        check_source(self)
 
-    def field(self, rho: Any, eta: Any) -> tuple[Any, Any]:
+    def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
         z = eta - self.height
         inverse = 1 / (rho**2 + z**2)
         amplitude = self.orientation * math.sqrt(self.strength) * inverse**2 * inverse**0.5
-        return 3 * z * rho * amplitude, (2 * z**2 - rho**2) * amplitude
+        return 3 * z * rho * amplitude, (2 * z**2 - rho**2) * amplitude, 0.0
 
     def intensity(self, rho: Any, eta: Any) -> Any:
         """M (rho^2 + 4 z^2)/(rho^2 + z^2)^4 with z = eta - height (paper eq. 33)."""
@@ -89,23 +105,57 @@ class Dipole:
         return Outline(f"dipole at height {self.height:g}", ((0.0, self.height),), self.orientation)
 
 
-def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any]:
-    """Sum (h_rho, h_z) of the fields of all sources at (rho, eta)."""
+def check_source(source: Any) -> None:
+    """Check the arguments that sources have in common, those that one has.
+
+    Raises
+    ------
+    InputError
+    """
+    lengths = "a finite number > 0 is allowed (in units of R0)"
+    rules: dict[str, tuple[Callable[[float], bool], str]] = {
+        "strength": (lambda v: v >= 0, "a finite number >= 0 is allowed"),
+        "height": (lambda v: True, "a finite number is allowed (in units of R0; negative is below)"),
+        "radius": (lambda v: v > 0, lengths),
+        "length": (lambda v: v > 0, lengths),
+    }
+    for name, (good, allowed) in rules.items():
+        value = getattr(source, name, 1.0)
+        if not (is_number(value) and good(value)):
+            raise InputError(f"source.{name}", value, allowed)
+    orientation = getattr(source, "orientation", 1)
+    if isinstance(orientation, bool) or orientation not in (1, -1):
+        raise InputError("source.orientation", orientation, "1 or -1 is allowed")
+
+
+def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any, Any]:
+    """Sum (h_rho, h_z, h_theta) of the fields of all sources at (rho, eta)."""
     fields = [source.field(rho, eta) for source in sources]
-    return sum(f[0] for f in fields), sum(f[1] for f in fields)
+    return sum(f[0] for f in fields), sum(f[1] for f in fields), sum(f[2] for f in fields)
 
 
 def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rho: Any, eta: Any) -> Any:
     """-chi/2 |h|^2 per reference area, in units of mu T."""
     if len(sources) == 1:
         return -susceptibility / 2 * sources[0].intensity(rho, eta)
-    h_rho, h_z = magnetic_field(sources, rho, eta)
-    return -susceptibility / 2 * (h_rho**2 + h_z**2)
+    h_rho, h_z, h_theta = magnetic_field(sources, rho, eta)
+    return -susceptibility / 2 * (h_rho**2 + h_z**2 + h_theta**2)
 
 
-def is_number(value: object) -> bool:
-    """Whether a value is a finite number, NumPy's included; truth values are none."""
-    try:
-        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(float(value))
-    except OverflowError:  # a whole number that no float can hold
-        return False
+def swept(before: Array, after: Array, circle: tuple[float, float]) -> bool:
+    """Whether a meridian that moved between two polylines, shape (2, n) each, went through a circle around the axis.
+
+    The circle was passed if it lies in the region between them, that is if one of the quadrilaterals winds around it.
+    """
+    corners = np.stack([before[:, :-1], before[:, 1:], after[:, 1:], after[:, :-1]]) - np.array(circle)[:, None]
+    x, y = corners[:, 0], corners[:, 1]
+    angle = np.arctan2(x * np.roll(y, -1, 0) - y * np.roll(x, -1, 0), x * np.roll(x, -1, 0) + y * np.roll(y, -1, 0))
+    return bool((np.abs(angle.sum(axis=0)) > math.pi).any())
+
+
+def distance_to_polyline(rho: Array, eta: Array, circle: tuple[float, float]) -> float:
+    """Smallest distance of a point of the half-plane (a circle around the axis) from a meridian of straight pieces, shape (n,) each."""
+    ends = np.stack([rho, eta]) - np.array(circle)[:, None]
+    along = np.diff(ends)
+    share = np.clip(-(ends[:, :-1] * along).sum(axis=0) / (along**2).sum(axis=0), 0, 1)
+    return float(np.hypot(*(ends[:, :-1] + share * along)).min())

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError
+from .checks import is_number
 
 
 class Material(Protocol):
@@ -72,6 +73,14 @@ class Ogden:
                 f"the sum of mu alpha must be 2 (shear modulus 1), not {sum(products):.9g}; divide mu by {sum(products) / 2:.9g}",
             )
 
+    @classmethod
+    def treloar(cls) -> Ogden:
+        """Three terms fitted to Treloar's vulcanised rubber: Ogden, Proc. R. Soc. Lond. A 326 (1972).
+
+        mu = (6.3, 0.012, -0.1) kg/cm^2 with alpha = (1.3, 5, -2): a shear modulus of 4.225 kg/cm^2 (0.414 MPa), the unit here.
+        """
+        return cls(tuple(m / 4.225 for m in (6.3, 0.012, -0.1)), (1.3, 5.0, -2.0))
+
     def energy(self, e1: Any, e2: Any) -> Any:
         # p + q + r cancels to second order in the strain; with (1 + p)(1 + q)(1 + r) = 1 the product form keeps all digits
         total = 0.0
@@ -97,18 +106,71 @@ class Ogden:
         return s11, s12, s22
 
 
-@dataclass(frozen=True)
-class NeoHookean:
-    """Neo-Hookean strain energy W = (lambda_1^2 + lambda_2^2 + lambda_3^2 - 3)/2: Ogden's with one term, mu = 1 and alpha = 2."""
+class OgdenForm:
+    """A material that is Ogden's with terms that follow from fewer numbers, which may be symbols."""
+
+    def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
+        """Moduli and exponents."""
+        raise NotImplementedError
+
+    def _ogden(self) -> Ogden:
+        form = object.__new__(Ogden)  # not checked again
+        for key, values in zip(("mu", "alpha"), self.terms(), strict=True):
+            object.__setattr__(form, key, values)
+        return form
 
     def energy(self, e1: Any, e2: Any) -> Any:
-        return Ogden((1.0,), (2.0,)).energy(e1, e2)
+        return self._ogden().energy(e1, e2)
 
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
-        return Ogden((1.0,), (2.0,)).stress(e1, e2)
+        return self._ogden().stress(e1, e2)
 
     def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
-        return Ogden((1.0,), (2.0,)).tangent(e1, e2)
+        return self._ogden().tangent(e1, e2)
+
+
+@dataclass(frozen=True)
+class NeoHookean(OgdenForm):
+    """Neo-Hookean strain energy W = (lambda_1^2 + lambda_2^2 + lambda_3^2 - 3)/2: Ogden's with one term, mu = 1 and alpha = 2."""
+
+    def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
+        return (1.0,), (2.0,)
+
+
+@dataclass(frozen=True)
+class Varga(OgdenForm):
+    """Varga's strain energy W = 2 (lambda_1 + lambda_2 + lambda_3 - 3): Ogden's with one term, mu = 2 and alpha = 1."""
+
+    def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
+        return (2.0,), (1.0,)
+
+
+@dataclass(frozen=True)
+class MooneyRivlin(OgdenForm):
+    """Mooney-Rivlin strain energy W = C_1 (I_1 - 3) + C_2 (I_2 - 3) with 2 (C_1 + C_2) = 1, I_2 the sum of the lambda_i^-2.
+
+    Parameters
+    ----------
+    ratio : float
+        C_2/C_1 >= 0; 0 is neo-Hookean. The Baker-Ericksen inequality is C_1 + C_2 lambda_3^2 > 0 at every lambda_3: both moduli are
+        needed, so that a negative ratio is unstable at some stretch.
+
+    Raises
+    ------
+    InputError
+        For a negative ratio.
+    """
+
+    ratio: float
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.ratio) and self.ratio >= 0):
+            reason = "the stress does not grow with the stretch (Baker-Ericksen) at every stretch otherwise"
+            raise InputError("material.ratio", self.ratio, f"a finite number C2/C1 >= 0 is allowed: {reason}")
+
+    def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
+        twice = 1 / (1 + self.ratio)  # 2 C_1
+        return (twice, -twice * self.ratio), (2.0, -2.0)
 
 
 def _powers(alpha: float, e1: Any, e2: Any) -> tuple[Any, Any, Any]:

@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
-from .magnetics import Dipole, is_number
+from .checks import is_number
+from .magnetics import Dipole
 
 #: SI unit of every quantity
 UNITS: Mapping[str, str] = {

@@ -3,10 +3,12 @@
 Mechanical: lambda_i W_i, what the strain energy feels. Total: with the inflating pressure through the thickness and the Maxwell and
 magnetisation stresses, ::
 
-    s_11 = lambda_1 W_1 - P T/R0 + (chi + 1/2) (h_t^2 - h_n^2)
-    s_22 = lambda_2 W_2 - P T/R0 - (h_t^2 + h_n^2)/2 - chi h_n^2
+    s_11 = lambda_1 W_1 - P T/R0 + chi (h_t^2 - h_n^2) + (h_t^2 - h_n^2 - h_theta^2)/2
+    s_22 = lambda_2 W_2 - P T/R0 + chi (h_theta^2 - h_n^2) + (h_theta^2 - h_t^2 - h_n^2)/2
 
-where (h_t, h_n) are the components of the magnetic field along the meridian and the normal.
+where (h_t, h_n, h_theta) are the components of the magnetic field of all sources together along the meridian, the normal and around the
+axis: the diagonal of chi (h x h - h_n^2 1) + h x h - |h|^2/2 1, of which the paper has the case h_theta = 0. With h_t h_theta different
+from 0 there is a magnetic shear (chi + 1) h_t h_theta besides, and these two are not principal.
 """
 
 from __future__ import annotations
@@ -16,9 +18,9 @@ from typing import Any
 
 def total_stress(
     mechanical: tuple[Any, Any],
-    pressure: float,
+    pressure: Any,
     radius_to_thickness: float,
-    field: tuple[Any, Any],
+    field: tuple[Any, Any, Any],
     tangent: tuple[Any, Any],
     susceptibility: float,
 ) -> tuple[Any, Any]:
@@ -27,15 +29,16 @@ def total_stress(
     Parameters
     ----------
     mechanical : (lambda_1 W_1, lambda_2 W_2)
-    pressure : P = p R0/(mu T)
+    pressure : P = p R0/(mu T) at the point
     radius_to_thickness : R0/T
-    field : (h_rho, h_z) in units of sqrt(mu/mu0), strengths included
+    field : (h_rho, h_z, h_theta) in units of sqrt(mu/mu0), strengths included
     tangent : unit tangent (t_rho, t_z) of the deformed meridian
     susceptibility : chi
     """
     h_t = field[0] * tangent[0] + field[1] * tangent[1]
     h_n = field[1] * tangent[0] - field[0] * tangent[1]
     through = pressure / radius_to_thickness
-    s11 = mechanical[0] - through + (susceptibility + 0.5) * (h_t**2 - h_n**2)
-    s22 = mechanical[1] - through - (h_t**2 + h_n**2) / 2 - susceptibility * h_n**2
+    around = field[2] ** 2
+    s11 = mechanical[0] - through + (susceptibility + 0.5) * (h_t**2 - h_n**2) - around / 2
+    s22 = mechanical[1] - through - (h_t**2 + h_n**2) / 2 - susceptibility * h_n**2 + (susceptibility + 0.5) * around
     return s11, s22

@@ -55,6 +55,8 @@ class Equilibrium:
         Wall time spent on this equilibrium and its verdicts.
     gas : Gas or None
         The enclosed gas that holds it, when found under gas control.
+    load_energy : float
+        Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without.
     """
 
     pressure: float
@@ -69,14 +71,15 @@ class Equilibrium:
     state: Array = field(repr=False)
     seconds: float = field(default=0.0, repr=False)
     gas: Gas | None = field(default=None, repr=False)
+    load_energy: float = field(default=0.0, repr=False)
     _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
     _zones: dict[str, Zones] = field(default_factory=dict, repr=False)
     _errors: dict[str, ErrorEstimate] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
-        """Elastic plus magnetic energy."""
-        return self.elastic_energy + self.magnetic_energy
+        """Elastic, magnetic and load energy."""
+        return self.elastic_energy + self.magnetic_energy + self.load_energy
 
     @property
     def potential(self) -> Potential:

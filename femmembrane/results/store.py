@@ -49,6 +49,7 @@ MEANING: Mapping[str, tuple[str, str]] = {
     "center_height": ("height of the pole over R0", "1"),
     "elastic_energy": ("elastic energy over mu T R0^2", "1"),
     "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
+    "load_energy": ("energy of the loads over mu T R0^2", "1"),
     "residual": ("out-of-balance force relative to the forces in balance", "1"),
     "iterations": ("solver iterations, rejected attempts included", "1"),
     "seconds": ("wall time spent on the equilibrium", "s"),
@@ -96,7 +97,7 @@ Array = NDArray[np.float64]
 #: a variable of a data set: dimensions and values
 _Variable = tuple[tuple[str, ...], Any]
 
-_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "seconds")
+_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "load_energy", "residual", "seconds")
 _SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
 #: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
 _SPECIAL, _LIMIT = "special_", "limit_"
@@ -222,8 +223,12 @@ def _table_variables(branch: Branch) -> dict[str, _Variable]:
 
 def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, _Variable]:
     """What :func:`_equilibria` needs to build the records again; ``width`` is the length of their states."""
-    magnetic = any(e.scene.sources for e in equilibria)
-    scalars = [name for name in _SCALARS if magnetic or name != "magnetic_energy"]
+    absent = {
+        name
+        for name, kind in (("magnetic_energy", "sources"), ("load_energy", "loads"))
+        if not any(getattr(e.scene, kind) for e in equilibria)
+    }
+    scalars = [name for name in _SCALARS if name not in absent]
     return {
         **{prefix + name: ((dimension,), _array(name, (getattr(e, name) for e in equilibria))) for name in scalars},
         prefix + "iterations": ((dimension,), _array("iterations", (e.iterations for e in equilibria))),

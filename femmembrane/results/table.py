@@ -27,14 +27,16 @@ def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
     ``lambda_`` and ``verdict_`` exist for the controls in ``scene.analysis.stability``, ``lambda_n`` for the modes in
-    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources, ``pressure_pa`` when it has scales, ``fraction_`` of
-    the area for each kind of zone if it asks for ``wrinkling``, ``error_`` (relative, estimated) if it asks for ``error_estimates``.
+    ``scene.analysis.azimuthal_modes``, ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, ``pressure_pa``
+    when it has scales, ``fraction_`` of the area for each kind of zone if it asks for ``wrinkling``, ``error_`` (relative, estimated) if it
+    asks for ``error_estimates``.
     """
     scene = branch.scene
     controls = [c for c in CONTROLS if c in scene.analysis.stability]
     return [
         *("step", "volume", "pressure", "center_height", "elastic_energy"),
         *(["magnetic_energy"] if scene.sources else []),
+        *(["load_energy"] if scene.loads else []),
         *(f"lambda_{c}" for c in controls),
         *(f"verdict_{c}" for c in controls),
         *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),

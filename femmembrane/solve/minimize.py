@@ -170,7 +170,7 @@ def nlp_functions(potential: Potential) -> NlpFunctions:
     data = ca.DM(potential.point_data.T)
 
     t, (_, local_symbol, parameters) = potential.terms, potential.symbols
-    total = t["elastic"] + t["magnetic"] - parameters[0] * t["volume"]
+    total = t["elastic"] + t["magnetic"] + t["load"] - parameters[0] * t["volume"]
     force = t["gradient"] - parameters[0] * t["volume_gradient"]
     curvature = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local_symbol)
 

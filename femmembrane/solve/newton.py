@@ -114,10 +114,10 @@ def _compiled(
     gradients, densities = potential.results()
     x, parameters = x.copy(), np.array([pressure, magnetic], dtype=float)
     numbers = control.numbers(potential.space)
-    converged, pressure, elastic, magnetic, volume, iterations, correction, residual, gap, border = elements.correct(
+    converged, pressure, elastic, field_energy, volume, iterations, correction, residual, gap, border = elements.correct(
         numbers, x, parameters, tolerance, RESIDUAL, max_iterations, gradients, densities
     )
-    evaluation = potential.evaluation(x, (elastic, magnetic, volume), gradients, densities)
+    evaluation = potential.evaluation(x, (elastic, field_energy, volume), gradients, densities, magnetic)
     bordered = None if border is None else CompiledBorder(border)
     status = Status.CONVERGED if converged else Status.NOT_CONVERGED
     return NewtonResult(x, pressure, evaluation, bordered, iterations, correction, residual, gap, status)

@@ -2,6 +2,7 @@
 
 ======================== ==================================================================================================
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
+``load.K.NAME``          a number of load K: ``load.0.gamma``
 ``membrane.susceptibility``  chi
 ``material.NAME``        a number of a material that has such an argument
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 #: added to a strength, so that its square root can be differentiated at zero; no strength above 1e-284 notices
 _TINY = 1e-300
+#: parts of a scene that are lists, by their names
+_LISTS = {"source": "sources", "load": "loads"}
 
 
 @dataclass(frozen=True)
@@ -65,8 +68,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return float(self.scene.susceptibility or 0.0)
-        place, _, name = rest.rpartition(".") if part == "source" else ("", "", rest)
-        owner = self.scene.sources[int(place)] if part == "source" else self.scene.material
+        place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
+        owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
         number = getattr(owner, key)
         return float(number[int(index)] if index else number)
@@ -90,6 +93,9 @@ class Parameter:
                 self._check_modulus(value, material.alpha[int(rest[3:])])
             return self.scene.replace(material=dataclasses.replace(material, **self._material_numbers(rest, value)))
         index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
+        if part == "load":
+            changed = dataclasses.replace(self.scene.loads[index], **{name: value})  # type: ignore[type-var]  # a dataclass, by its name
+            return self.scene.replace(loads=(*self.scene.loads[:index], changed, *self.scene.loads[index + 1 :]))
         sources: list[Any] = list(self.scene.sources)
         sources[index] = dataclasses.replace(sources[index], **{name: value})
         scales = self.scene.scales
@@ -102,6 +108,7 @@ class Parameter:
         scene, (part, _, rest) = self.scene, self.name.partition(".")
         material: Any = scene.material
         sources: tuple[Any, ...] = scene.sources
+        loads: tuple[Any, ...] = scene.loads
         susceptibility = scene.susceptibility
         if part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
@@ -109,13 +116,16 @@ class Parameter:
             material = _with_exponent(material, int(rest[6:]), value)
         elif part == "material":
             material = _unchecked(material, **self._material_numbers(rest, value))
+        elif part == "load":
+            index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
+            loads = (*loads[:index], _unchecked(loads[index], **{name: value}), *loads[index + 1 :])
         else:
             index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
             changed = [
                 _Scaled(_unchecked(s, strength=1.0), value) if name == "strength" else _unchecked(s, **{name: value}) for s in sources
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
-        parts = {"material": material, "sources": sources, "susceptibility": susceptibility}
+        parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
         return SimpleNamespace(**parts, mesh=scene.mesh, degree=scene.degree, tension_field=scene.tension_field)
 
     def _check_modulus(self, value: float, alpha: float) -> None:
@@ -142,6 +152,7 @@ class Parameter:
 def names(scene: Scene) -> list[str]:
     """Names of all numbers of a scene that can be varied."""
     found = [f"source.{k}.{name}" for k, source in enumerate(scene.sources) for name in _numbers(source)]
+    found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
     if scene.sources:
         found.append("membrane.susceptibility")
     material = scene.material
@@ -173,10 +184,9 @@ class _Scaled:
     source: Any
     factor: Any
 
-    def field(self, rho: Any, eta: Any) -> tuple[Any, Any]:
-        h_rho, h_z = self.source.field(rho, eta)
+    def field(self, rho: Any, eta: Any) -> tuple[Any, ...]:
         amplitude = np.sqrt(self.factor + _TINY)
-        return amplitude * h_rho, amplitude * h_z
+        return tuple(amplitude * component for component in self.source.field(rho, eta))
 
     def intensity(self, rho: Any, eta: Any) -> Any:
         return self.factor * self.source.intensity(rho, eta)

@@ -14,8 +14,8 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment
-from .start import flat_state, spherical_dome, start_at_volume
-from .state import Path, State, distance
+from .start import spherical_dome, start_at_volume
+from .state import Path, State, distance, flat_state, rests_flat
 from .wellposed import ill_posed, is_slack
 
 #: volumes of the domes from which branches and deflated iterations set out
@@ -45,7 +45,7 @@ class Search:
 
     def run(self) -> None:
         """Trace the branches through the starts, then deflate until nothing new appears."""
-        if self.load == 0 and not self.potential.sources:
+        if self.load == 0 and rests_flat(self.potential):
             self._add(flat_state(self.potential))
         for volume in STARTS:
             try:
@@ -64,9 +64,9 @@ class Search:
             for segment in follow(self.potential, first_point(self.potential, state, direction), self.max_steps):
                 self._points.append(segment.b)
                 volumes.append(segment.b.state.volume)
-                if segment.crosses(self.quantity, self.load):
-                    with suppress(SolveError):  # through the flat unloaded state there is no path
-                        self._add(segment.crossing(self.quantity, self.load).state)
+                with suppress(SolveError):  # through the flat unloaded state there is no path
+                    for point in segment.crossings(self.quantity, self.load):
+                        self._add(point.state)
                 if abs(volumes[-1]) > FAR:
                     break
         self.traced.append((min(volumes), max(volumes)))
@@ -153,18 +153,27 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
 class Limit:
     """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one.
 
-    ``slack`` is the state at which a tension field ended before either was met.
+    ``ill_posed`` is the state at which the branch became so, slack or compressed, before either was met: what follows is the mesh's.
     """
 
     fold: Located | None
     landing: State | None
-    slack: State | None = None
+    ill_posed: State | None = None
 
 
 def beyond_limit(
-    potential: Potential, state: State, quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
+    potential: Potential,
+    state: State,
+    quantity: str,
+    load: float,
+    stable: Callable[[State], bool],
+    *,
+    any_before: bool = False,
+    max_steps: int = 300,
 ) -> Limit:
-    """Follow the branch from the last state before a load that it does not reach.
+    """Follow the branch from the last state before a load that was not reached by steps in the load itself.
+
+    So close to a fold such steps can fail on this side of it: then there is a landing and no fold.
 
     Parameters
     ----------
@@ -173,6 +182,8 @@ def beyond_limit(
     load : float
     stable : callable
         Whether a state is a minimum under the control.
+    any_before : bool
+        Whether a state before the fold will do that is none.
     """
     start = first_point(potential, state, 1)
     here = state.volume if quantity == "volume" else state.pressure
@@ -181,14 +192,14 @@ def beyond_limit(
     kind = next(k for k, q in FOLDS.items() if q == quantity)
     fold: Located | None = None
     for segment in follow(potential, start, max_steps):
+        if ill_posed(potential, segment.b.state.evaluation) is not None:
+            return Limit(fold, None, segment.b.state)
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
-        if segment.crosses(quantity, load):
-            landing = segment.crossing(quantity, load).state
-            if stable(landing):
-                return Limit(fold, landing)
-        if is_slack(potential, segment.b.state):
-            return Limit(fold, None, segment.b.state)
+        for met in segment.crossings(quantity, load):
+            before = fold is None or met.sigma < fold.point.sigma
+            if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
+                return Limit(None if before else fold, met.state)
         if abs(segment.b.state.volume) > FAR:
             break
     return Limit(fold, None)

@@ -8,7 +8,7 @@ each converged: the rate itself, not the step, decides when it is found.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -17,8 +17,8 @@ from ..errors import SolveError, Status
 from ..potential import Potential
 from .continuation import BranchPoint, tangent_at
 from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
-from .newton import correct
-from .state import State, hermite
+from .newton import correct, relative_size
+from .state import State, flat_state, hermite, rests_flat
 
 #: the folds looked for: their name and the quantity that is stationary
 FOLDS = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "center_height"}
@@ -30,6 +30,10 @@ _CONTROLS: dict[str, Callable[[float], Control]] = {
 }
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
+#: largest relative change of a point by the correction that puts it on a value
+SAME_SIDE = 1e-7
+#: a fold that lies this close to a value, relative to 1 + its size, lies on it
+ON_FOLD = 1e-13
 
 
 @dataclass(slots=True)
@@ -48,6 +52,7 @@ class Segment:
         self.potential, self.a, self.b = potential, a, b
         self.length = b.sigma - a.sigma
         self._known = {0.0: a, 1.0: b}
+        self._folds: dict[str, list[tuple[float, Located]]] = {}
 
     def at(self, share: float) -> BranchPoint:
         """The point of the branch at a share of the arc length between the ends.
@@ -80,14 +85,20 @@ class Segment:
 
     def folds(self, kind: str) -> list[Located]:
         """All folds of a kind on the segment: sign changes of the rate, also those that the cubic through the ends shows in pairs."""
-        quantity = FOLDS[kind]
-        shares = self._brackets(quantity)
-        rates = [self.at(s).rate(quantity, self.potential) for s in shares]
-        return [
-            self._fold(kind, lo, hi)
-            for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
-            if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
-        ]
+        return [fold for _, fold in self._folds_at(kind)]
+
+    def _folds_at(self, kind: str) -> list[tuple[float, Located]]:
+        """The folds of a kind with their shares of the segment, located once."""
+        if kind not in self._folds:
+            quantity = FOLDS[kind]
+            shares = self._brackets(quantity)
+            rates = [self.at(s).rate(quantity, self.potential) for s in shares]
+            self._folds[kind] = [
+                self._fold(kind, lo, hi)
+                for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
+                if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
+            ]
+        return self._folds[kind]
 
     def _brackets(self, quantity: str) -> list[float]:
         """0, 1, and between them the extremum of the rate where the cubic says that the rate changes sign twice."""
@@ -100,12 +111,15 @@ class Segment:
             return [0.0, float(top), 1.0]
         return [0.0, 1.0]
 
-    def _fold(self, kind: str, low: float, high: float) -> Located:
+    def _fold(self, kind: str, low: float, high: float) -> tuple[float, Located]:
         quantity = FOLDS[kind]
-        return self.root(kind, lambda point: point.rate(quantity, self.potential), low, high)
+        return self._root(kind, lambda point: point.rate(quantity, self.potential), low, high)
 
     def root(self, kind: str, function: Callable[[BranchPoint], float], low: float, high: float) -> Located:
         """The point between two shares of the segment where a function of the point changes sign."""
+        return self._root(kind, function, low, high)[1]
+
+    def _root(self, kind: str, function: Callable[[BranchPoint], float], low: float, high: float) -> tuple[float, Located]:
         share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
         point = self.at(share)
         h = 1e-3 * (high - low)
@@ -113,24 +127,43 @@ class Segment:
         slope = (function(near) - function(point)) / (near.sigma - point.sigma)
         offset = abs(function(point) / slope) + point.state.correction
         moved = max(abs(point.rate(q, self.potential)) * offset / (1 + abs(self.value(q, point))) for q in FOLDS.values())
-        return Located(kind, point, float(moved + point.state.correction))
+        return share, Located(kind, point, float(moved + point.state.correction))
 
-    def crosses(self, quantity: str, value: float) -> bool:
-        """Whether the quantity takes the value on the segment, its first point left out."""
-        a, b = self.value(quantity, self.a) - value, self.value(quantity, self.b) - value
-        return b == 0 or a * b < 0
+    def crossings(self, quantity: str, value: float) -> list[BranchPoint]:
+        """The points at which a quantity takes a value, in order, each corrected under that control; the first end does not count.
 
-    def crossing(self, quantity: str, value: float) -> BranchPoint:
-        """The point at which a quantity takes a value, exactly: corrected under that control."""
-        share = brentq(lambda s: self.value(quantity, self.at(s)) - value, 0.0, 1.0, xtol=1e-10)
+        A fold in the quantity between the ends may lie on either side of the value, or on it, within round-off: then it is the point.
+        """
+        kind = next(k for k, q in FOLDS.items() if q == quantity)
+        shares = [0.0, *(share for share, _ in self._folds_at(kind)), 1.0]
+        ends = [self.value(quantity, self.at(s)) - value for s in shares]
+        ends = [ends[0], *(0.0 if abs(e) <= ON_FOLD * (1 + abs(value)) else e for e in ends[1:-1]), ends[-1]]
+        return [
+            self.at(high) if b == 0 and high != 1.0 else self._crossing(quantity, value, low, high)
+            for low, high, a, b in zip(shares, shares[1:], ends, ends[1:], strict=False)
+            if b == 0 or a * b < 0
+        ]
+
+    def _crossing(self, quantity: str, value: float, low: float, high: float) -> BranchPoint:
+        if value == 0 and self._through_flat:
+            a, b = self.value(quantity, self.a), self.value(quantity, self.b)
+            return replace(self.a, state=flat_state(self.potential), sigma=self.a.sigma + self.length * a / (a - b))
+        share = brentq(lambda s: self.value(quantity, self.at(s)) - value, low, high, xtol=1e-14, rtol=8.9e-16)
         point = self.at(share)
         pressure = value if quantity == "pressure" else point.state.pressure
         exact = correct(self.potential, _CONTROLS[quantity](value), point.state.x, pressure, tolerance=_EXACT)
-        if exact.status is Status.CONVERGED:  # singular only where the fold in this very quantity lies on the value
+        # so close to a fold that its two sides are hard to tell apart the corrector may end on the other one, or nowhere
+        if exact.status is Status.CONVERGED and relative_size(self.potential, exact.x - point.state.x, point.state.x) <= SAME_SIDE:
             sigma = point.sigma
             point = tangent_at(self.potential, State.of(exact), point)
             point.sigma = sigma
         return point
+
+    @property
+    def _through_flat(self) -> bool:
+        """Whether the segment leads to the mirror side of the flat membrane at rest, which no corrector finds."""
+        mirrored = all(self.value(q, self.a) * self.value(q, self.b) < 0 for q in FOLDS.values())
+        return mirrored and rests_flat(self.potential)
 
 
 def branch_point(segment: Segment) -> Located | None:

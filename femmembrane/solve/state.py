@@ -9,7 +9,8 @@ import numpy as np
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, band_inner
-from .newton import NewtonResult
+from .controls import PressureControl
+from .newton import NewtonResult, correct
 
 
 @dataclass(slots=True)
@@ -47,6 +48,16 @@ class State:
     @property
     def volume(self) -> float:
         return self.evaluation.volume
+
+
+def rests_flat(potential: Potential) -> bool:
+    """Whether the flat membrane is an equilibrium without load: nothing pulls at it."""
+    return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
+
+
+def flat_state(potential: Potential) -> State:
+    """The flat membrane at rest: an equilibrium without stiffness, which no path leaves or passes."""
+    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0))
 
 
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:

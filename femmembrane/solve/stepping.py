@@ -17,12 +17,14 @@ from .banded import BorderedFactor
 from .controls import Control
 from .newton import NewtonResult, correct
 from .state import Path, State, distance
-from .wellposed import is_slack, slackness
+from .wellposed import ill_posed, is_slack, slackness
 
 #: largest change that the corrector may make, relative to the step
 MAX_DEVIATION = 0.2
-#: a step this much shorter than the distance to go means that the branch turns or ends
+#: a step this much shorter than the way, and than the load itself, means that the branch turns or ends
 MIN_STEP = 1e-4
+#: and so does one that is this small a part of the whole way
+ROUND_OFF = 1e-15
 
 Corrector = Callable[..., NewtonResult]
 
@@ -72,7 +74,7 @@ def march(
     if not path.sigma:
         path.append(start, state.x, state.pressure, *_slope(potential, state, control_at(start), parameter, start))
     accepted = [state]
-    here, step, shortest = start, stop - start, abs(stop - start) * MIN_STEP
+    here, step = start, stop - start
     spent = 0
     while here != stop:
         there = stop if abs(stop - here) <= abs(step) * (1 + 1e-12) else here + step
@@ -95,12 +97,14 @@ def march(
                 raise slackness(potential, new, accepted)
         else:
             step = (there - here) / 2
-            if abs(step) < shortest:
-                raise SolveError(
-                    f"the branch could not be followed beyond {here:.9g} on the way to {stop:.9g}",
-                    status=Status.STEP_UNDERFLOW,
-                    result=accepted,
-                )
+            # sources at full strength may lie next to a fold, and nobody else looks for a state there: the way to go counts, not the whole
+            way = abs(stop - here) if parameter == "magnetic" else min(abs(stop - start), abs(here) or np.inf)
+            if abs(step) < max(MIN_STEP * way, ROUND_OFF * abs(stop - start)):
+                message = f"the branch could not be followed beyond {here:.9g} on the way to {stop:.9g}"
+                bad = ill_posed(potential, accepted[-1].evaluation) if parameter == "load" else None
+                if bad is not None:
+                    raise SolveError(f"{message}: {bad}", status=bad.status, result=accepted)
+                raise SolveError(message, status=Status.STEP_UNDERFLOW, result=accepted)
     return accepted[1:]
 
 

@@ -64,15 +64,28 @@ def _folds(potential: Potential, x: Array, scale: float) -> Array:
     return R[unsupported(stress, scale, True)]
 
 
+def unresolved_source(potential: Potential, x: Array) -> str:
+    """That a source is nearer to the pole than the nodes there are to each other, so that its field is not resolved; empty if none is."""
+    if not potential.sources:
+        return ""
+    space = potential.space
+    u, _, w, _ = space.evaluate(x, space.ends[:2])
+    (R, Z), pole = space.mesh.position(space.ends[1:2]), space.center_height(x)
+    spacing = np.hypot(R[0] + u[1], Z[0] + w[1] - pole) / potential.scene.degree
+    near = float(np.sqrt(min(source.distance_squared(0.0, pole) for source in potential.sources)))
+    return f"the pole is {near:.2g} from a source, where nodes are {spacing:.2g} apart: its field is not resolved" if near < spacing else ""
+
+
 def is_slack(potential: Potential, state: State) -> bool:
     """Whether a state is the end of a tension field."""
     return potential.scene.tension_field and ill_posed(potential, state.evaluation) is not None
 
 
 def slackness(potential: Potential, state: State, accepted: list[State] | None = None) -> SolveError:
-    """The error that ends a path at a slack state, with the states accepted before and it."""
+    """The error that ends a path at an ill-posed state, slack or compressed, with the states accepted before and it."""
     where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
-    return SolveError(f"at {where} {ill_posed(potential, state.evaluation)}", status=Status.SLACK, result=accepted)
+    status = Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
+    return SolveError(f"at {where} {ill_posed(potential, state.evaluation)}", status=status, result=accepted)
 
 
 def unsupported(stress: Array, scale: float, tension_field: bool) -> NDArray[np.bool_]:

@@ -13,16 +13,17 @@ e = -(n a + c)/R, f = -n b/R, q = (a + n c)/R, the displacement gradient has the
 and the quadratic form is, per reference area,
 
     W_11 g1t^2 + 2 W_12 g1t g2th + W_22 g2th^2 + A (g1th^2 + g2t^2) + 2 B g1th g2t + W_1/l1 g1nu^2 + W_2/l2 g2nu^2
-    + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: magnetic energy density)
+    + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: energy density of sources, loads)
 
 with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
-2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Integrals over theta are normalised as for n = 0, 2 pi
+2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. A load g(eta) over the projected area adds the same with g for
+eta in the first term and g' before the others, and g'' rho rho_x b^2. Integrals over theta are normalised as for n = 0, 2 pi
 instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues do not depend on it. c plays no part at n = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -34,6 +35,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..physics.kinematics import hencky_strains
+from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
@@ -83,7 +85,7 @@ class LocalResponse:
     N1, N2 : W_1/l1 and W_2/l2, the stiffness of rotation out of the surface
     A, B : in-plane shear moduli, continuous through l1 = l2
     field : ndarray, shape (6, ...)
-        m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta of the magnetic energy density.
+        m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta of the energy density of sources and loads.
     """
 
     rho: Array
@@ -308,7 +310,7 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     space = potential.space
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
-    band = layout.assemble(_density(space, response, pressure, n))
+    band = layout.assemble(_density(space, response, potential.loads, pressure, n))
     return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space)
 
 
@@ -325,17 +327,18 @@ def _check_waves(n: int, least: int) -> None:
         raise InputError("azimuthal", n, f"a whole number >= {least} is allowed")
 
 
-def _density(space: Space, r: LocalResponse, pressure: float, n: int) -> list[Array]:
+def _density(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: float, n: int) -> list[Array]:
     """Second derivatives of the quadratic form at the points, times the weights, in the order of _PAIRS."""
     J = np.hypot(space.R_x, space.Z_x)
     area = space.weights * space.R * J
     xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
-    work = -pressure * space.weights
+    g, g_z, g_zz = over_projection(loads, r.eta)
+    work = (g_z - pressure) * space.weights
     t, z = r.t_rho, r.t_z
     A, B, N1, N2 = r.A, r.B, r.N1, r.N2
     along, out, across = A * t**2 + N2 * z**2, A * z**2 + N2 * t**2, (A - N2) * t * z  # of e, of f, mixed
     _, m_r, _, m_rr, m_rz, m_zz = r.field
-    volume_c = work * r.eta
+    volume_c = (g - pressure * r.eta) * space.weights
     entries = {
         (_A, _A): (r.W22 + n**2 * along) * oo + m_rr * area,
         (_A, _AX): r.W12 * t * xo + volume_c,
@@ -353,7 +356,7 @@ def _density(space: Space, r: LocalResponse, pressure: float, n: int) -> list[Ar
         (_C, _BX): n * r.W12 * z * xo,
         (_CX, _CX): A * xx,
         (_CX, _B): -n * B * z * xo,
-        (_B, _B): n**2 * out * oo + m_zz * area,
+        (_B, _B): n**2 * out * oo + m_zz * area + g_zz * r.rho * r.rho_x * space.weights,
         (_BX, _BX): (r.W11 * z**2 + N1 * t**2) * xx,
     }
     return [entries[pair] for pair in _PAIRS]
@@ -374,6 +377,8 @@ def azimuthal_eigenvalue(potential: Potential, x: Array, pressure: float, n: int
 
 
 def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigenvalue:
+    if not operator.band.shape[1]:
+        raise InputError("mesh.elements", 1, "one linear element has no unknowns with waves around the axis; two, or degree 2, are allowed")
     start = _Spectrum(operator, None).first_guess() if guess is None else guess
     return smallest_eigenvalue(operator.band, operator.mass, operator.half_bandwidth, None, start)
 

@@ -30,6 +30,7 @@ from scipy.integrate import solve_ivp
 
 from ..discretization.meridian import disc
 from ..errors import InputError, SolveError, Status, unknown_name
+from ..physics.loads import over_projection
 from ..potential import Array, Potential, potential_of
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
 from ..solve.finer import solved_in
@@ -156,7 +157,7 @@ class _Coefficients:
     """Second derivatives of F along the radius, from Chebyshev interpolants in each element."""
 
     def __init__(self, potential: Potential, x: Array, pressure: float) -> None:
-        self.ends, self.pressure = potential.space.mesh.breakpoints(), pressure
+        self.ends, self.pressure, self.loads = potential.space.mesh.breakpoints(), pressure, potential.loads
         angle = np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         size = np.diff(self.ends)
         s = self.ends[:-1, None] + size[:, None] * (1 + np.cos(angle)) / 2
@@ -180,10 +181,11 @@ class _Coefficients:
         low, high = self.ends[element : element + 2]
         angle = np.arccos(np.clip((2 * r - low - high) / (high - low), -1, 1))
         p1, p2, p3, g1, g2, w22, m1, m2, m3, rho, eta, rho_s = (np.cos(self._order * angle) @ self._series[element]).tolist()
-        P = self.pressure
+        g, g_z, g_zz = over_projection(self.loads, eta)
+        P = self.pressure - g_z
         slopes = r * np.array([[p1, p2], [p2, p3]])
-        mixed = np.array([[g1 - P * eta, g2], [-P * rho, 0.0]])
-        values = np.array([[w22 / r + r * m1, r * m2 - P * rho_s], [r * m2 - P * rho_s, r * m3]])
+        mixed = np.array([[g1 - self.pressure * eta + g, g2], [-P * rho, 0.0]])
+        values = np.array([[w22 / r + r * m1, r * m2 - P * rho_s], [r * m2 - P * rho_s, r * m3 + g_zz * rho * rho_s]])
         return slopes, mixed, values
 
 

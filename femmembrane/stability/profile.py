@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..discretization.space import space_of
 from ..physics.kinematics import meridional_strain
+from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
 from ..physics.scales import Scales
 from ..physics.stress import total_stress
@@ -68,7 +69,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     x : ndarray, shape (n_free,)
         Displacement coefficients.
     pressure : float
-        P = p R0/(mu T); enters the total stresses only.
+        P = p R0/(mu T); enters the total stresses only, with what loads add to it.
     s : ndarray, shape (n,)
     """
     space = space_of(scene.mesh, scene.degree)
@@ -80,8 +81,9 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
     rho, eta = R + u, Z + w
     mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
-    h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0)
+    h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
-    total = total_stress(mechanical, pressure, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
+    local = pressure - over_projection(scene.loads, eta)[1]
+    total = total_stress(mechanical, local, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
     return Profile(R, rho, eta, (e1, e2), mechanical, total)

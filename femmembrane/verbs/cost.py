@@ -206,7 +206,7 @@ def cost(
         When the reference cannot be found. A method that fails does not raise: its line says so.
     """
     control, load = prescribed(volume, pressure, center_height)
-    if load == 0 and not scene.sources:
+    if load == 0 and not (scene.sources or scene.loads):
         raise InputError(control, load, "a load other than 0 is allowed without sources: the flat membrane has no stiffness to step from")
     _whole("degrees", degrees, MAX_DEGREE)
     _whole("elements", elements)

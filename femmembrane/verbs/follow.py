@@ -20,10 +20,11 @@ from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl,
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
 from ..solve.search import Limit, beyond_limit
-from ..solve.start import START_VOLUME, flat_state, start_at_height, start_at_pressure, start_at_volume
-from ..solve.state import Path, State
+from ..solve.special_points import ON_FOLD
+from ..solve.start import START_VOLUME, start_at_height, start_at_pressure, start_at_volume
+from ..solve.state import Path, State, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
-from ..solve.wellposed import slackness
+from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
@@ -39,6 +40,8 @@ _STARTS: dict[str, Callable[[Potential, float], State]] = {
 #: the controls of a minimiser; a height is held by no potential
 _MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
+#: share of a load at which a path to the flat membrane at rest, or through it, is close enough to leave out the rest
+NEAR_ZERO = 1e-3
 
 
 @one_thread
@@ -285,6 +288,14 @@ class _Turn:
         return f"{where}, from which the membrane would jump to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
 
 
+def _load_of(start: Equilibrium, control: str, potential: Potential, state: State) -> float:
+    """The load of a start; that of the state it was corrected to where this is another one, as in another scene."""
+    given = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
+    height = potential.space.center_height(state.x)
+    found = {"volume": state.evaluation.volume, "pressure": state.pressure, "height": height}[control]
+    return given if abs(found - given) <= 1e-9 * max(abs(given), 1.0) else float(found)
+
+
 class _Walk:
     """From load to load under one control, with the memory that predicts the next state."""
 
@@ -296,7 +307,7 @@ class _Walk:
         self.load = 0.0
         if start is not None:
             self.state = resume(potential, start)
-            self.load = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
+            self.load = _load_of(start, control, potential, self.state)
             if self.corrector is minimize_and_verify and not is_minimum(potential, self.control_at(self.load), self.state.evaluation):
                 message = f"the start (V = {start.volume:.6g}, P = {start.pressure:.6g}) is no minimum under {control} control"
                 raise SolveError(message, status=Status.NOT_A_MINIMUM)
@@ -314,34 +325,56 @@ class _Walk:
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
             self.state, self.path = self._first(load), Path()
-        elif load == 0 and not self.potential.sources:
-            self.state, self.path = flat_state(self.potential), Path()
+        elif self.load * load <= 0 and rests_flat(self.potential):
+            return self._through_flat(load, jump)
         elif load != self.load:
             try:
                 states = march(self.potential, self.state, self.control_at, self.load, load, path=self.path, corrector=self.corrector)
                 states[-1].iterations = sum(s.iterations for s in states)
                 self.state = states[-1]
             except SolveError as error:
-                if error.status is Status.SLACK:
+                if error.status.ill_posed:
                     raise
                 turn = self._turn(error, load)
-                if turn.limit.fold is None and turn.limit.slack is not None:
-                    raise slackness(self.potential, turn.limit.slack) from error
-                reached = turn.limit.landing
-                if turn.limit.fold is None and reached is not None:
-                    turn = None  # hard to follow under this control, but by arc length the branch goes there without a turn
-                if reached is None or (turn is not None and not jump):
-                    raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn and turn.limit.fold else error.status) from error
-                self.state, self.path = reached, Path()
+                if turn.limit.fold is None and turn.limit.landing is not None:
+                    self.state, self.path, self.load = turn.limit.landing, Path(), load
+                    return self.state, None
+                if turn.limit.fold is None and turn.limit.ill_posed is not None:
+                    raise slackness(self.potential, turn.limit.ill_posed) from error
+                if not jump or turn.limit.landing is None:
+                    raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
+                self.state, self.path = turn.limit.landing, Path()
         self.load = load
+        if unresolved := unresolved_source(self.potential, self.state.x):
+            raise SolveError(unresolved, status=Status.DIPOLE_CONTACT)
         return self.state, turn
 
+    def _through_flat(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
+        """To the flat membrane at rest, or to the other side of it, where the mirror image of every state is one at the opposite load."""
+        state, turn = self.to(NEAR_ZERO * self.load, jump)
+        self.path = Path()
+        if load == 0:
+            self.state, self.load = flat_state(self.potential), load
+            return self.state, turn
+        mirrored = state.x.copy()
+        mirrored[self.potential.space.fields[1]] *= -1
+        self.load *= -1
+        self.state = State.of(self.corrector(self.potential, self.control_at(self.load), mirrored, -state.pressure))
+        state, later = self.to(load, jump)
+        return state, later or turn
+
     def _flat(self, x: Array) -> bool:
-        return not self.potential.sources and not x.any()
+        return not x.any() and rests_flat(self.potential)
 
     def _first(self, load: float) -> State:
         guess = self.cold(self.potential, load)
         result = self.corrector(self.potential, self.control_at(load), guess.x, guess.pressure)
+        if (
+            result.status is Status.NOT_CONVERGED
+            and self.quantity == "pressure"
+            and abs(guess.pressure - load) <= ON_FOLD * (1 + abs(load))
+        ):
+            return guess  # a limit point at this very pressure, which no corrector finds under pressure control
         if result.status is not Status.CONVERGED:
             raise SolveError(f"the state found there has V = {guess.volume:.6g} and P = {guess.pressure:.6g}", status=result.status)
         return State.of(result, guess.iterations)
@@ -351,7 +384,15 @@ class _Walk:
         if self.quantity not in _MINIMISED or last is None:
             return _Turn(Limit(None, None))
         control = self.control_at(load)
-        return _Turn(beyond_limit(self.potential, last, self.quantity, load, lambda s: is_minimum(self.potential, control, s.evaluation)))
+        limit = beyond_limit(
+            self.potential,
+            last,
+            self.quantity,
+            load,
+            lambda s: is_minimum(self.potential, control, s.evaluation),
+            any_before=self.corrector is correct,
+        )
+        return _Turn(limit)
 
 
 def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
@@ -362,6 +403,8 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
     scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
     state = start_at_volume(potential, START_VOLUME) if start is None else resume(potential, start)
+    if rests_flat(potential) and gas.pressure(0.0) == 0:
+        return record(scene, potential, flat_state(potential), clock=clock, gas=gas)
     # the amount that holds the state at hand is known: march from it to the wanted one
     held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
     if held <= 0 or state.volume <= -gas.chamber:

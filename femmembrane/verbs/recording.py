@@ -97,6 +97,7 @@ def record(
         status=state.status if bad is None else bad.status,
         scene=scene,
         state=coefficients,
+        load_energy=state.evaluation.load_energy,
         seconds=0.0 if clock is None else time.perf_counter() - clock,
         gas=gas,
         _verdicts=verdicts,

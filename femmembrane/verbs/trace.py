@@ -236,7 +236,7 @@ class _Tracing:
         if isinstance(start, Equilibrium):
             state = resume(potential, start)
         elif isinstance(start, (int, float, np.number)) and not isinstance(start, bool) and np.isfinite(start):
-            if start == 0 and not potential.sources:
+            if start == 0 and not potential.surrounded:
                 raise InputError(
                     "start", start, "the flat unloaded membrane has no stiffness to start from; a small volume is allowed, such as 1e-3"
                 )
@@ -297,18 +297,20 @@ class _Tracing:
         new = next(self.points)
         self.timings["solve"] += time.perf_counter() - clock
         segment = Segment(self.potential, self.point, new)
-        met = [segment.crossing(q, v) for q, v in targets.items() if segment.crosses(q, v)]
+        met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
         if self.special is not None:
             self._look_for_special_points(segment, last)
         self.add(last or new, clock)
         if self.special is not None:
             self._look_for_onsets(segment, last or new)
-        if last is not None:
+        if last is not None and not wellposed.unresolved_source(self.potential, last.state.x):
             return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
         self.point, self.regular = new, len(self.found)
         if ill_posed == "stop" and (end := self._ill_posed(new)) is not None:
             return end
+        if unresolved := wellposed.unresolved_source(self.potential, new.state.x):
+            return Status.DIPOLE_CONTACT, f"{unresolved} (V = {new.state.volume:.6g})"
         if self._contact(new):
             return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
         return None

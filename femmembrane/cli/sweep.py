@@ -6,7 +6,9 @@ import sys
 import time
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from cyclopts import Parameter
 
 from ..errors import InputError
 from .folders import prepare, read
@@ -21,7 +23,7 @@ def sweep(
     scene: Path,
     /,
     *,
-    over: list[str],
+    over: Annotated[list[str], Parameter(negative=())],
     out: Path,
     quantity: str = "branch",
     pressure: float | None = None,

@@ -379,13 +379,15 @@ static int correct(const Elements *s, const Control *control, double *x, double 
         const double ratio = size / previous, foretold = size * (previous == HUGE_VAL ? (size < 1.0 ? size : 1.0) : ratio * ratio);
         if (foretold <= tolerance / 10) {
             for (Py_ssize_t i = 0; i < n; i++)
-                force[i] = gradients[i] - p * vg[i];
+                force[i] = p * vg[i] - gradients[i];
             if (all_finite(force, n) && all_finite(stiffness, N_STIFF * np)) {
+                double unused;
+                r->gap = control_equation(control, n, x, p, r->values[2], vg, row, &unused);
+                border_solve(b, force, -r->gap, dx);
+                r->correction = relative_size(s, dx, x);
                 r->residual = relative_residual(s, force, density, p);
-                if (r->residual <= confirmed) {
-                    double unused;
-                    r->gap = control_equation(control, n, x, p, r->values[2], vg, row, &unused);
-                    r->converged = 1, r->correction = foretold;
+                if (r->correction <= tolerance / 10 && r->residual <= confirmed) {
+                    r->converged = 1;
                     break;
                 }
             }

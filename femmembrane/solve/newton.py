@@ -27,8 +27,8 @@ UNBALANCED = 1e-9
 class NewtonResult:
     """Where the corrector ended.
 
-    ``correction`` is the relative size of the Newton correction at x, computed or foretold by the quadratic convergence of those before;
-    ``residual`` and ``gap`` are evaluated at x; ``bordered`` are the last factors, at x or one correction before.
+    ``correction`` is the relative size of the Newton correction at x by ``bordered``, the last factors, at x or one correction before;
+    ``residual`` and ``gap`` are evaluated at x.
     """
 
     x: Array
@@ -70,7 +70,7 @@ def correct(
     -------
     NewtonResult
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
-        foretold from two corrections in quadratic convergence and confirmed by the residual at x.
+        foretold from two corrections in quadratic convergence and confirmed by the residual at x and its correction by the factors before.
     """
     elements = None if damped else potential.elements
     if elements is not None:
@@ -95,13 +95,15 @@ def correct(
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual has the last word
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; what the factors at hand make of the residual at x
+        # (next to a limit point a small one may be far from the solution) and the residual itself have the last word
         foretold = size * (min(size, 1.0) if previous == np.inf else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
-            result = last.result(iteration, foretold, Status.CONVERGED)
-            if last.finite and result.residual <= RESIDUAL:
-                return result
+            if last.finite and (left := relative_size(potential, last.newton_step()[0], x)) <= tolerance / 10:
+                result = last.result(iteration, left, Status.CONVERGED)
+                if result.residual <= RESIDUAL:
+                    return result
         previous = size
 
 

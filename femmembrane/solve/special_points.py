@@ -69,7 +69,11 @@ class Segment:
         z = hermite(ends[0], slopes[0], ends[1], slopes[1], share)
         dual = (1 - share) * self.a.dual + share * self.b.dual
         dual_pressure = (1 - share) * self.a.tangent_pressure + share * self.b.tangent_pressure
-        result = correct(self.potential, ArcLengthControl(dual, dual_pressure, z[:-1], float(z[-1])), z[:-1], float(z[-1]))
+        # next to a fold what is left of the correction is far in the quantity that turns; a very fine mesh has more round-off than this
+        across = ArcLengthControl(dual, dual_pressure, z[:-1], float(z[-1]))
+        result = correct(self.potential, across, z[:-1], float(z[-1]), tolerance=_EXACT)
+        if result.status is not Status.CONVERGED:
+            result = correct(self.potential, across, z[:-1], float(z[-1]))
         if result.status is not Status.CONVERGED:
             raise SolveError("the branch between two neighbouring points could not be resolved", status=result.status)
         point = tangent_at(self.potential, State.of(result), self.a)

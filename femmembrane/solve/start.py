@@ -269,8 +269,12 @@ def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, st
     tracer = Tracer(Path(), StepControl().first * min(1.0, np.sqrt(abs(point.state.volume - potential.space.reference_volume))))
     try:
         for _, new in zip(range(steps), trace_points(potential, point, tracer), strict=False):
-            for met in Segment(potential, point, new).crossings("pressure", pressure):
-                if negative_directions(met.state.evaluation.band, kd) == 0:
+            segment = Segment(potential, point, new)
+            for met in segment.crossings("pressure", pressure):
+                # at the limit point itself round-off has the sign of the smallest eigenvalue: there the side that is stable says it
+                at_limit = any(met is fold.point for fold in segment.folds("limit_point"))
+                judged = (point, new) if at_limit else (met,)
+                if any(negative_directions(p.state.evaluation.band, kd) == 0 for p in judged):
                     return met.state
             if is_slack(potential, new.state):
                 return None

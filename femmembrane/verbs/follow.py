@@ -375,7 +375,7 @@ class _Walk:
         guess = self.cold(self.potential, load)
         result = self.corrector(self.potential, self.control_at(load), guess.x, guess.pressure)
         if (
-            result.status is Status.NOT_CONVERGED
+            result.status in (Status.NOT_CONVERGED, Status.NOT_A_MINIMUM)
             and self.quantity == "pressure"
             and abs(guess.pressure - load) <= ON_FOLD * (1 + abs(load))
         ):

@@ -206,6 +206,17 @@ class Space:
             notes.append(f"{moves} across the axis cost no energy: they are left out of verdicts on n = 1")
         return tuple(notes)
 
+    @cached_property
+    def _end_positions(self) -> Array:
+        return np.stack(self.mesh.position(self.ends))
+
+    def end_position(self, x: Array, k: int) -> tuple[float, float]:
+        """Deformed position (rho, eta) of the k-th end of elements, whose coefficients are its displacement."""
+        k %= self.n_elements + 1
+        u, w = (float(x[i]) if i < self.n_free else 0.0 for i in self.numbers[self.nodes[self.degree * k]])
+        R, Z = self._end_positions[:, k]
+        return float(R + u), float(Z + w)
+
     def axis_heights(self, x: Array) -> list[float]:
         """Heights of the nodes on the axis and of rigid discs across it."""
         return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]

@@ -6,6 +6,7 @@ compressive, but where the meridional one vanishes nothing holds the meridian ag
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,11 +70,15 @@ def unresolved_source(potential: Potential, x: Array) -> str:
     if not potential.sources:
         return ""
     space = potential.space
-    u, _, w, _ = space.evaluate(x, space.ends[:2])
-    (R, Z), pole = space.mesh.position(space.ends[1:2]), space.center_height(x)
-    spacing = np.hypot(R[0] + u[1], Z[0] + w[1] - pole) / potential.scene.degree
-    near = float(np.sqrt(min(source.distance_squared(0.0, pole) for source in potential.sources)))
-    return f"the pole is {near:.2g} from a source, where nodes are {spacing:.2g} apart: its field is not resolved" if near < spacing else ""
+    for k in (0, -1):
+        if not space.on_axis[k]:
+            continue
+        (_, pole), (rho, eta) = space.end_position(x, k), space.end_position(x, 1 if k == 0 else -2)
+        spacing = math.hypot(rho, eta - pole) / potential.scene.degree
+        near = math.sqrt(min(float(source.distance_squared(0.0, pole)) for source in potential.sources))
+        if near < spacing:
+            return f"the pole is {near:.2g} from a source, where nodes are {spacing:.2g} apart: its field is not resolved"
+    return ""
 
 
 def is_slack(potential: Potential, state: State) -> bool:

@@ -95,8 +95,8 @@ def correct(
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; what the factors at hand make of the residual at x
-        # (next to a limit point a small one may be far from the solution) and the residual itself have the last word
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, itself and
+        # what the factors at hand make of it (next to a limit point a small residual may be far from the solution)
         foretold = size * (min(size, 1.0) if previous == np.inf else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)

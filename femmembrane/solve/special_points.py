@@ -17,7 +17,7 @@ from ..errors import SolveError, Status
 from ..potential import Potential
 from .continuation import BranchPoint, tangent_at
 from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
-from .newton import correct, relative_size
+from .newton import TOLERANCE, correct
 from .state import State, flat_state, hermite, rests_flat
 
 #: the folds looked for: their name and the quantity that is stationary
@@ -30,8 +30,6 @@ _CONTROLS: dict[str, Callable[[float], Control]] = {
 }
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
-#: largest relative change of a point by the correction that puts it on a value
-SAME_SIDE = 1e-7
 #: a fold that lies this close to a value, relative to 1 + its size, lies on it
 ON_FOLD = 1e-13
 
@@ -69,11 +67,12 @@ class Segment:
         z = hermite(ends[0], slopes[0], ends[1], slopes[1], share)
         dual = (1 - share) * self.a.dual + share * self.b.dual
         dual_pressure = (1 - share) * self.a.tangent_pressure + share * self.b.tangent_pressure
-        # next to a fold what is left of the correction is far in the quantity that turns; a very fine mesh has more round-off than this
-        across = ArcLengthControl(dual, dual_pressure, z[:-1], float(z[-1]))
-        result = correct(self.potential, across, z[:-1], float(z[-1]), tolerance=_EXACT)
-        if result.status is not Status.CONVERGED:
-            result = correct(self.potential, across, z[:-1], float(z[-1]))
+        control = ArcLengthControl(dual, dual_pressure, z[:-1], float(z[-1]))
+        # as good as round-off lets it be: the pressure of a fold is the last digit that tells its two sides apart
+        for tolerance in (_EXACT, TOLERANCE):
+            result = correct(self.potential, control, z[:-1], float(z[-1]), tolerance=tolerance)
+            if result.status is Status.CONVERGED:
+                break
         if result.status is not Status.CONVERGED:
             raise SolveError("the branch between two neighbouring points could not be resolved", status=result.status)
         point = tangent_at(self.potential, State.of(result), self.a)
@@ -156,12 +155,12 @@ class Segment:
         point = self.at(share)
         pressure = value if quantity == "pressure" else point.state.pressure
         exact = correct(self.potential, _CONTROLS[quantity](value), point.state.x, pressure, tolerance=_EXACT)
-        # so close to a fold that its two sides are hard to tell apart the corrector may end on the other one, or nowhere
-        if exact.status is Status.CONVERGED and relative_size(self.potential, exact.x - point.state.x, point.state.x) <= SAME_SIDE:
-            sigma = point.sigma
-            point = tangent_at(self.potential, State.of(exact), point)
-            point.sigma = sigma
-        return point
+        if exact.status is not Status.CONVERGED:  # so close to a fold that the control is singular
+            return point
+        moved = tangent_at(self.potential, State.of(exact), point)
+        moved.sigma = point.sigma
+        # next to a fold the corrector may have ended on its other side
+        return moved if moved.rate(quantity, self.potential) * point.rate(quantity, self.potential) > 0 else point
 
     @property
     def _through_flat(self) -> bool:

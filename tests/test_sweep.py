@@ -325,7 +325,7 @@ def test_processes_are_started_for_what_is_left(plain, monkeypatch):
 
 def test_a_cluster_of_which_a_worker_is_killed(plain):
     distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None, "silence_logs": 50}
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(**options) as cluster:
         pids = [nanny.pid for nanny in cluster.workers.values()]
         seen = []

@@ -252,7 +252,9 @@ class Potential:
             elements.at_quadrature(np.ascontiguousarray(x), local)
         u, _, w, _ = local
         rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
-        square = [min([s.distance_squared(rho, eta).min(), *(s.distance_squared(0.0, pole) for pole in poles)]) for s in self.sources]
+        square = [s.distance_squared(rho, eta).min() for s in self.sources]
+        # a source all along the axis runs through hubs, and through a pole nowhere (a scene refuses it)
+        square += [s.distance_squared(0.0, pole) for s in self.sources if "along" in s.sees for pole in poles]
         return math.sqrt(min(square))
 
     def passed_source(self, before: Array, after: Array) -> bool:

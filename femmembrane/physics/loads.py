@@ -43,6 +43,9 @@ def wall_density(wall: Any, wall_s: Any, w: Any, w_s: Any) -> Any:
 class Load:
     """A load besides the pressure: no load at all, unless a method says otherwise."""
 
+    #: motions of the membrane as a whole, "along" the axis and "across" it, on which it works
+    sees: frozenset[str] = frozenset({"along", "across"})
+
     @property
     def acts(self) -> bool:
         """Whether there is anything to build."""

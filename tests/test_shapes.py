@@ -14,8 +14,9 @@ from scipy.optimize import brentq, minimize_scalar
 import femmembrane as fm
 from femmembrane.discretization.space import Space
 from femmembrane.discretization.supports import SUPPORTS, free_rotations
-from femmembrane.potential import Potential, potential_of
+from femmembrane.potential import Family, Potential, potential_of
 from femmembrane.solve.banded import band_product
+from femmembrane.solve.parameter import Parameter
 from femmembrane.solve.start import guess_at_volume
 from femmembrane.stability.azimuthal import azimuthal_operator
 
@@ -385,6 +386,9 @@ def test_a_wire_holds_nothing_along_the_axis() -> None:
     ):
         space = potential_of(plain.replace(sources=sources, susceptibility=1.0)).space
         assert (space.pin, space.rotations) == (kept, rotations)
+    wire = plain.replace(sources=[fm.Wire(0.2)], susceptibility=1.0)
+    for name in ("source.0.strength", "membrane.susceptibility"):  # followed in a number it floats as well
+        assert Family(wire, Parameter(wire, name).vary).space.pin == pin
 
 
 def test_a_torus_is_drawn_off_its_wire() -> None:
@@ -401,6 +405,24 @@ def test_a_volume_next_to_the_moderately_inflated_one(aspect: float) -> None:
     scene = around_a_wire(fm.torus(aspect, 8), 0.02)
     volume = 1.1 * potential_of(scene).space.reference_volume
     assert fm.equilibrium(scene, volume=volume).volume == pytest.approx(volume, rel=1e-9)
+
+
+def test_a_pulled_hub_by_collocation() -> None:
+    """A neo-Hookean annulus without pressure, its hub lifted by F: at the hub F_eta = -F/(2 pi)."""
+    force = 1.5
+    eq = fm.equilibrium(of(fm.annulus(0.3, 16), degree=6, loads=[fm.HubForce(force)]), pressure=0.0, solver="newton")
+    found = _collocated(eq, lambda s: s, (0.3, 1.0), lambda a, b: np.array([a[0] - 0.3, a[3] + force / (2 * np.pi), b[0] - 1, b[1]]))
+    s = np.linspace(0.3, 1.0, 31)
+    profile = eq.profile(s)
+    assert eq.center_height > 0.2
+    assert found.sol(s)[0] == pytest.approx(profile["rho"], abs=1e-8)
+    assert found.sol(s)[1] == pytest.approx(profile["eta"], abs=1e-8)
+    # the cut at any radius carries the same force along the axis
+    space = eq.potential.space
+    u_s, w_s = space.recovered_slopes(eq.state, space.node_parameters())
+    p = eq.profile(space.node_parameters())
+    carried = 2 * np.pi * space.node_parameters() * p["mechanical_stress_1"] / p["stretch_1"] * -w_s / np.hypot(1 + u_s, w_s)
+    assert carried == pytest.approx(force, rel=1e-7)
 
 
 # --- shapes against each other

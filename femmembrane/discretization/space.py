@@ -132,13 +132,12 @@ class Space:
         self.pin = self.widest if adrift and not self.loose else None
         off_axis = [end for end, pole in zip(self.supports, on_axis, strict=False) if not pole]
         self.spreads = any("u" not in end.held for end in off_axis)
-        self.wall = self._between([R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)])
+        walls = [R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)]
+        self.wall = self.between(walls) if any(walls) else None
         self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
 
-    def _between(self, at_ends: list[float]) -> tuple[Array, Array] | None:
-        """A linear function of the meridian and its slope along the reference element, from values at its ends; None for zeros."""
-        if not any(at_ends):
-            return None
+    def between(self, at_ends: list[float]) -> tuple[Array, Array]:
+        """A linear function of the meridian and its slope along the reference element, from values at its ends."""
         slope = (at_ends[1] - at_ends[0]) / (self.ends[-1] - self.ends[0])
         return at_ends[0] + slope * (self.s - self.ends[0]), np.broadcast_to(slope * self.sizes, self.s.shape)
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import femmembrane as fm
+from femmembrane.accuracy.shooting import shoot
+from femmembrane.accuracy.strong_form import Guess
 
 from ..cases import OGDEN, disc_scene
 from .registry import Exit, Family, Number, Stop, run_file, settled
@@ -41,6 +45,37 @@ def steep(exponent: float, volume: float) -> float:
     material = fm.Ogden(mu=(2 / exponent,), alpha=(exponent,))
     coarse, fine = (settled(fm.equilibrium(disc_scene(material, elements=n, degree=p), volume=volume)) for n, p in ((32, 4), (64, 6)))
     return coarse.pressure / fine.pressure
+
+
+LOCKING = "the pole at {} of J_m, where the energy has no bound"
+
+
+@FAMILY.case("Gent, J_m = 2, V = 2.45", LOCKING.format("97 %"), Number((1.0, 1.0), rel=1e-9), 2.0, 0.96, {"volume": 2.45})
+@FAMILY.case("Gent, J_m = 10, V = 8", LOCKING.format("97 %"), Number((1.0, 1.0), rel=1e-9), 10.0, 0.96, {"volume": 8.0})
+@FAMILY.case("Gent, J_m = 30, V = 25", LOCKING.format("95 %"), Number((1.0, 1.0), rel=1e-9), 30.0, 0.85, {"volume": 25.0})
+@FAMILY.case("Gent, J_m = 2, P = 100", LOCKING.format("99 %"), Number((1.0, 1.0), rel=1e-9), 2.0, 0.98, {"pressure": 100.0})
+@FAMILY.case("Gent, J_m = 30, P = 100", LOCKING.format("99 %"), Number((1.0, 1.0), rel=1e-9), 30.0, 0.98, {"pressure": 100.0})
+def locking(jm: float, share: float, load: dict[str, float]) -> tuple[float, float]:
+    """P and V over those of shooting; somewhere I_1 - 3 is above this share of J_m."""
+    scene = disc_scene(fm.Gent(jm), elements=16, degree=6)
+    eq = settled(fm.equilibrium(scene, **load))
+    found = shoot(scene, guess=Guess.of(eq), **load)
+    profile = eq.profile()
+    stretched = 2 * NH.energy(np.log(profile["stretch_1"]), np.log(profile["stretch_2"])).max()
+    if not (found.converged and stretched > share * jm):
+        raise AssertionError(f"shooting: {found.message!r}; {stretched / jm:.3g} of J_m")
+    return eq.pressure / found.pressure, eq.volume / found.volume
+
+
+BEYOND = "no membrane is that large"
+
+
+@FAMILY.case("Gent, J_m = 2, V = 3", BEYOND, Stop(fm.Status.STEP_UNDERFLOW, r"beyond 2\.5"), 2.0, 3.0)
+@FAMILY.case("Gent, J_m = 5, V = 1000", BEYOND, Stop(fm.Status.STEP_UNDERFLOW, r"beyond 4\.6"), 5.0, 1e3)
+@FAMILY.case("Gent, J_m = 30, V = 10000", BEYOND, Stop(fm.Status.STEP_UNDERFLOW, r"beyond 26\.7"), 30.0, 1e4)
+def beyond_locking(jm: float, volume: float) -> fm.Equilibrium:
+    """The message says how far it came: as far as the chains reach."""
+    return settled(fm.equilibrium(disc_scene(fm.Gent(jm), elements=16, degree=6), volume=volume))
 
 
 HUGE = "overflows on the way"

@@ -315,6 +315,18 @@ class _Walk:
                 message = f"the start (V = {start.volume:.6g}, P = {start.pressure:.6g}) is no minimum under {control} control"
                 raise SolveError(message, status=Status.NOT_A_MINIMUM)
 
+    def _begin_before(self, load: float, failure: SolveError) -> None:
+        """Stand at the moderately inflated membrane on the way to a volume at which sources could not be turned on: steps from there reach
+        it, or meet the fold that is the reason."""
+        rest, size = self.potential.space.reference_volume, moderate(self.potential)
+        if self.quantity != "volume" or failure.status.ill_posed or abs(load - rest) <= size or not self.potential.surrounded:
+            raise failure
+        self.load = rest + float(np.copysign(size, load - rest))
+        try:
+            self.state, self.path = self._first(self.load), Path()
+        except SolveError:
+            raise failure from None
+
     def go_on(self, kept: Branch, loads: Array) -> None:
         """Stand where a run through these loads was interrupted."""
         memory = kept.memory
@@ -327,7 +339,11 @@ class _Walk:
         turn = None
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
-            self.state, self.path = self._first(load), Path()
+            try:
+                self.state, self.path = self._first(load), Path()
+            except SolveError as failure:
+                self._begin_before(load, failure)
+                return self.to(load, jump)
         elif self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
             return self._through_flat(load, jump)
         elif at_rest(self.potential, self.quantity, load):

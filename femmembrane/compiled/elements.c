@@ -10,6 +10,8 @@
 #include <string.h>
 
 #define LANES 4
+/* as in solve/newton.py */
+#define PRESSURE 1e-9
 /* points evaluated in one go: a block and the registers of the tape stay in the processor's cache */
 #define POINTS 256
 /* rows of the point function: energies and volume, two gradients, second derivatives, stresses */
@@ -303,6 +305,16 @@ static double relative_residual(const Elements *s, const double *residual, const
     return largest;
 }
 
+/* whether a correction of P changes no force */
+static int balanced(const Elements *s, double dp, const double *volume_gradient, const double *force, double pressure)
+{
+    double scale[2], largest = 0.0;
+    force_scale(s, force, pressure, scale);
+    for (Py_ssize_t i = 0; i < s->n_free; i++)
+        largest = fabs(volume_gradient[i]) > largest ? fabs(volume_gradient[i]) : largest;
+    return fabs(dp) * largest <= PRESSURE * (scale[0] > scale[1] ? scale[0] : scale[1]);
+}
+
 /* factors of K at the densities, with the column -V' and the row and corner in place; -1 without memory */
 static int bordered(const Elements *s, Border *b, const double *stiffness, const double *volume_gradient, double corner)
 {
@@ -360,7 +372,7 @@ static int correct(const Elements *s, const Control *control, double *x, double 
             force[i] = -force[i];
         const double dp = border_solve(b, force, -r->gap, dx), size = relative_size(s, dx, x);
         const int met = control->anywhere || fabs(r->gap) <= 1e-14 * (fabs(dot(b->row, x, n)) + fabs(corner * p));
-        const int done = size <= tolerance && (met || previous <= tolerance);
+        const int done = size <= tolerance && (met || previous <= tolerance) && balanced(s, dp, vg, density, p);
         const int stalled = !(size < HUGE_VAL) || (size > 0.5 * previous && size > 1e3 * tolerance);
         if (done || stalled || r->iterations == max_iterations) {
             r->converged = done;
@@ -373,7 +385,7 @@ static int correct(const Elements *s, const Control *control, double *x, double 
         parameters[0] = p += dp;
         evaluate(s, x, parameters, r->values, gradients, density);
         r->iterations++;
-        const double ratio = size / previous, foretold = size * (previous == HUGE_VAL ? (size < 1.0 ? size : 1.0) : ratio * ratio);
+        const double ratio = size / previous, foretold = size * (previous == HUGE_VAL || previous == 0.0 ? (size < 1.0 ? size : 1.0) : ratio * ratio);
         if (foretold <= tolerance / 10) {
             for (Py_ssize_t i = 0; i < n; i++)
                 force[i] = p * vg[i] - gradients[i];

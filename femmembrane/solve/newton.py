@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
+#: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
+PRESSURE = 1e-9
 
 
 @dataclass(slots=True)
@@ -83,6 +85,7 @@ def correct(
         size = relative_size(potential, dx, x)
         close, previously_close = size <= tolerance, previous <= tolerance
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
+        done = done and equations.balanced(dp)
         stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
@@ -90,9 +93,9 @@ def correct(
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; what the factors at hand make of the residual at x
-        # (next to a limit point a small one may be far from the solution) and the residual itself have the last word
-        foretold = size * (min(size, 1.0) if previous == np.inf else (size / previous) ** 2) if length == 1 else np.inf
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x and the correction that the
+        # factors at hand make of it (next to a limit point a small residual may be far from the solution) have the last word
+        foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
             if last.finite and (left := relative_size(potential, last.newton_step()[0], x)) <= tolerance / 10:
@@ -152,6 +155,11 @@ class Equations:
             return True
         _, row, corner = self.control.equation(self.potential.space, self.x, self.pressure, self.evaluation)
         return bool(abs(self.gap) <= 1e-14 * (abs(row @ self.x) + abs(corner * self.pressure)))
+
+    def balanced(self, dp: float) -> bool:
+        """Whether a correction of P changes no force."""
+        scale = max(self.potential.force_scale(self.evaluation, self.pressure))
+        return bool(abs(dp) * np.abs(self.evaluation.volume_gradient).max(initial=0.0) <= PRESSURE * scale)
 
     def newton_step(self) -> tuple[Array, float]:
         return self._factored.solve(-self.force, -self.gap)

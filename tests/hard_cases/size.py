@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import femmembrane as fm
 
 from ..cases import OGDEN, disc_scene
-from .registry import Exit, Family, Number, Stop, run_file, settled
+from .registry import Exit, Family, Number, Stop, reached, run_file, settled
 
 FAMILY = Family(5, "size")
 
@@ -43,6 +45,13 @@ def steep(exponent: float, volume: float) -> float:
     return coarse.pressure / fine.pressure
 
 
+@FAMILY.case("Gent, J = 0.988 J_m", "stresses grow without bound towards locking", Number(67.1193156, rel=1e-8), 26.0)
+@FAMILY.case("Gent, beyond locking", "no state has this volume", Stop(fm.Status.STEP_UNDERFLOW, "beyond 26.7"), 28.0)
+def locking(volume: float) -> float:
+    """J_m = 30; 32 elements of degree 8 agree to 1e-11 (recorded on 2026-11-24)."""
+    return settled(fm.equilibrium(disc_scene(fm.Gent(30.0), elements=16, degree=6), volume=volume)).pressure
+
+
 HUGE = "overflows on the way"
 
 
@@ -63,6 +72,15 @@ def huge(load: dict[str, float]) -> fm.Equilibrium:
 def few_elements(elements: int, degree: int) -> float:
     """P at V = 1. Of a cone by hand: stretches sqrt(1 + H^2) and 1, V = pi H/3, P = dW/dV; the others recorded on 2026-11-24."""
     return settled(fm.equilibrium(disc_scene(OGDEN, elements=elements, degree=degree), volume=1.0)).pressure
+
+
+@FAMILY.case("one linear element, by the corrector and traced", "the volume alone fixes the shape, not P", Number((0.0, 0.0), abs=1e-13))
+def cone() -> tuple[float, ...]:
+    """P over that of a cone by hand, 3 H (1 - (1 + H^2)^-2) at V = pi H/3, less one."""
+    scene = disc_scene(NH, elements=1, degree=1)
+    found = [fm.equilibrium(scene, volume=1.0, solver="newton"), reached(fm.trace(scene, start=0.5, until={"volume": 2.0}))[-1]]
+    heights = [3 * eq.volume / np.pi for eq in found]
+    return tuple(settled(eq).pressure / (3 * h * (1 - (1 + h * h) ** -2)) - 1 for eq, h in zip(found, heights, strict=True))
 
 
 @FAMILY.case("one linear element, two waves around the axis", "no unknown has any", Stop("mesh.elements", "two, or degree 2"), 1)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from .physics.invariant import Fung as Fung
     from .physics.invariant import Gent as Gent
     from .physics.invariant import Yeoh as Yeoh
+    from .physics.loads import HubForce as HubForce
     from .physics.loads import Hydrostatic as Hydrostatic
     from .physics.loads import Load as Load
     from .physics.loads import Weight as Weight
@@ -105,7 +106,7 @@ _ROOMS = {
     ),
     "errors": ("FemmembraneError", "InputError", "SolveError", "Status"),
     "physics.invariant": ("ArrudaBoyce", "Fung", "Gent", "Yeoh"),
-    "physics.loads": ("Hydrostatic", "Load", "Weight"),
+    "physics.loads": ("HubForce", "Hydrostatic", "Load", "Weight"),
     "physics.magnetics": ("Dipole", "Source"),
     "physics.materials": ("MooneyRivlin", "NeoHookean", "Ogden", "Varga"),
     "physics.scales": ("Scales",),

@@ -28,7 +28,7 @@ from .discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from .errors import InputError
 from .native import native
 from .physics.kinematics import hencky_strains
-from .physics.loads import Load, lidded_volume_density, over_projection, over_reference, volume_density, wall_density
+from .physics.loads import Load, hub_density, lidded_volume_density, on_hubs, over_projection, over_reference, volume_density, wall_density
 from .physics.magnetics import Source, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
 
@@ -104,15 +104,19 @@ class Potential:
                 "a liquid fills shapes that are closed by the plane z = 0 or by poles; leave it out, or choose such a shape and supports"
             )
             raise InputError("load", self.loads, advice)
+        pulled = any(type(load).on_hubs is not Load.on_hubs for load in self.loads)
+        forces = on_hubs(self.loads, [end.rigid for end in space.supports]) if pulled else None
         self.flat = not (space.Z.any() or space.Z_x.any())
         columns = {"R": space.R, "R_x": space.R_x, "weight": space.weights}
         if not self.flat:
             columns |= {"Z": space.Z, "Z_x": space.Z_x}
         if space.wall is not None:
             columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
+        if forces is not None:
+            columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with _casadi_answers_numpy():
-            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, tuple(columns), space.lids)
+            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, tuple(columns), space.lids, forces)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
 
@@ -252,7 +256,9 @@ class Potential:
             elements.at_quadrature(np.ascontiguousarray(x), local)
         u, _, w, _ = local
         rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
-        square = [min([s.distance_squared(rho, eta).min(), *(s.distance_squared(0.0, pole) for pole in poles)]) for s in self.sources]
+        square = [s.distance_squared(rho, eta).min() for s in self.sources]
+        # a source all along the axis runs through hubs, and through a pole nowhere (a scene refuses it)
+        square += [s.distance_squared(0.0, pole) for s in self.sources if "along" in s.sees for pole in poles]
         return math.sqrt(min(square))
 
     def passed_source(self, before: Array, after: Array) -> bool:
@@ -589,7 +595,12 @@ def _potential_of(scene: Scene) -> Potential:
 
 
 def _point_expressions(
-    scene: Scene, sources: Sequence[Source], loads: Sequence[Load], columns: Sequence[str], lids: bool
+    scene: Scene,
+    sources: Sequence[Source],
+    loads: Sequence[Load],
+    columns: Sequence[str],
+    lids: bool,
+    forces: tuple[Any, Any] | None,
 ) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
     """Symbols (data, local, parameters) and the weighted densities with their gradients at one point; what is no column of data is 0."""
     data = ca.SX.sym("data", len(columns))
@@ -621,6 +632,9 @@ def _point_expressions(
     load = ca.SX(0)
     if loads:
         load = area * over_reference(loads, R + u, Z + w) + weight * (R + u) * (R_x + u_x) * over_projection(loads, Z + w)[0]
+        if forces is not None:
+            hub, hub_x = (data[columns.index(c)] for c in ("hub", "hub_x"))
+            load += weight / (2 * math.pi) * hub_density(forces, hub, hub_x, Z + w, Z_x + w_x)
         load = parameters[1] * load
         second, first = ca.hessian(load, local)
         gradient, hessian = gradient + first, hessian + second

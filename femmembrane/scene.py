@@ -37,9 +37,10 @@ from numpy.typing import NDArray
 from .discretization.meridian import Disc, Meridian, disc
 from .discretization.mesh_files import Curve, read_meridian
 from .discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
+from .discretization.supports import as_support, floats
 from .errors import InputError, unknown_name
 from .physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
-from .physics.loads import Hydrostatic, Load, Weight
+from .physics.loads import HubForce, Hydrostatic, Load, Weight, on_hubs
 from .physics.magnetics import Dipole, Source, distance_to_polyline
 from .physics.materials import Material, MooneyRivlin, NeoHookean, Ogden, Varga
 from .physics.scales import AGREEMENT, Scales
@@ -64,7 +65,7 @@ SOURCES: dict[str, Any] = {
     "uniform": Uniform,
     "wire": Wire,
 }
-LOADS: dict[str, Any] = {"hydrostatic": Hydrostatic, "weight": Weight}
+LOADS: dict[str, Any] = {"hub-force": HubForce, "hydrostatic": Hydrostatic, "weight": Weight}
 SHAPES: dict[str, Any] = {
     "disc": Disc,
     "annulus": Annulus,
@@ -309,7 +310,7 @@ class Scene:
             _require(
                 _item_path("load", k, len(loads)),
                 load,
-                ("over_reference", "over_projection"),
+                ("over_reference", "over_projection", "on_hubs", "sees", "acts"),
                 "a load is allowed, such as Weight(weight=...)",
             )
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
@@ -325,13 +326,14 @@ class Scene:
             title=_text("title", self.title),
         )
         self._check_sources()
+        self._check_hubs()
 
     def _check_sources(self) -> None:
         R, Z = self.mesh.position(self.mesh.breakpoints())
         for k, source in enumerate(self.sources):
             path = _item_path("source", k, len(self.sources))
             allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
-            _require(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "refusal"), allowed)
+            _require(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "sees", "refusal"), allowed)
             # the axis is met at the ends of a meridian only: its breakpoints are enough; circles may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
@@ -352,6 +354,14 @@ class Scene:
                 f"no dipole of the scene has its strength, {self.scales.strength:.12g}, so it would do nothing; leave it out, or give a "
                 "dipole this strength (in a scene file: leave the strength of the dipole out)",
             )
+
+    def _check_hubs(self) -> None:
+        """Every force on a hub has its hub, and is held."""
+        supports = [as_support(held) for held in self.mesh.supports()]
+        forces = on_hubs(self.loads, [end.rigid for end in supports])
+        if floats(supports) and sum(forces) and not any("along" in load.sees for load in self.loads if load.acts):
+            advice = "nothing holds the membrane against it along the axis; hold an end, or let the forces on its two hubs add up to 0"
+            raise InputError("load.force", sum(forces), advice)
 
     @property
     def open(self) -> bool:

@@ -129,6 +129,119 @@ def test_a_heavy_liquid_flattens_the_top():
     assert local == pytest.approx(-(states[2].pressure - 0.6 * states[2].profile()["eta"]) / 1000, abs=1e-12)
 
 
+# --- a force on a hub
+
+
+def pulled(*loads, mesh=None, **rest):
+    return fm.Scene(material=fm.NeoHookean(), mesh=mesh or fm.annulus(0.3, 6), degree=3, loads=loads, **rest)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "hub", "place"),
+    [
+        (fm.annulus(0.3, 3), None, 0),
+        (fm.annulus(0.3, 3, inner="clamped", outer="hub"), "last", -1),
+        (fm.cylinder(2.0, 3, top="hub"), "first", 0),
+        (fm.cylinder(2.0, 3, bottom="hub"), None, -1),
+    ],
+)
+def test_energy_of_a_force_on_a_hub(mesh, hub, place):
+    """E = -F (height of the hub): its slope is -F with respect to that height and 0 to anything else; the factor on loads scales it."""
+    potential = potential_of(pulled(fm.HubForce(0.7, hub), mesh=mesh))
+    space = potential.space
+    s = space.interpolation_points()
+    x = space.interpolate(0.01 * np.sin(s), 0.05 * np.cos(s))
+    e, off = potential.evaluate(x, 0.0), potential.evaluate(x, 0.0, 0.0)
+    height = space.end_position(x, place)[1]
+    assert e.load_energy == pytest.approx(-0.7 * height, abs=1e-14)
+    assert potential.evaluate(x, 0.0, 0.5).load_energy == pytest.approx(e.load_energy / 2, abs=1e-14)
+    expected = np.zeros(space.n_free)
+    expected[space.numbers[space.nodes[place], 1]] = -0.7
+    assert e.gradient - off.gradient == pytest.approx(expected, abs=1e-12 * np.abs(e.gradient).max())
+    assert e.band == pytest.approx(off.band, abs=1e-12 * np.abs(e.band).max())
+    value = float(nlp_functions(potential).value(x, [0.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
+    assert value == pytest.approx(e.energy, rel=1e-12)
+
+
+def test_a_pulled_hub():
+    """Both solvers, both halves of the evaluation, the error estimate, and the work theorem dE_elastic/dF = F dz/dF."""
+    scene = pulled(fm.HubForce(0.8))
+    eq, other = (fm.equilibrium(scene, pressure=0.0, solver=solver) for solver in ("newton", "ipopt"))
+    assert other.center_height == pytest.approx(eq.center_height, rel=1e-9)
+    assert eq.load_energy == pytest.approx(-0.8 * eq.center_height, rel=1e-12)
+    assert eq.verdict("pressure").stable is True
+    compiled, numpy = eq.potential.evaluate(eq.state, 0.0), eq.potential._evaluate(eq.state, 0.0, 1.0)
+    assert compiled.gradient == pytest.approx(numpy.gradient, abs=1e-13)
+    down = fm.equilibrium(pulled(fm.HubForce(-0.8)), pressure=0.0)
+    assert down.center_height == pytest.approx(-eq.center_height, rel=1e-9)
+    h = 1e-4
+    low, high = (fm.equilibrium(pulled(fm.HubForce(0.8 + d)), pressure=0.0, solver="newton") for d in (-h, h))
+    work = 0.8 * (high.center_height - low.center_height)
+    assert high.elastic_energy - low.elastic_energy == pytest.approx(work, rel=1e-5)
+    truth = fm.equilibrium(scene.replace(mesh=fm.annulus(0.3, 12), degree=6), pressure=0.0, solver="newton")
+    assert eq.energy - truth.energy > 0  # an equilibrium held by its loads is a minimum, and the finer space goes lower
+    estimate = fm.equilibrium(scene, volume=eq.volume).error_estimate()
+    finer = fm.equilibrium(truth.scene, volume=eq.volume, solver="newton")
+    assert estimate.pressure.error == pytest.approx(eq.pressure - finer.pressure, rel=0.3)
+
+
+def test_a_closed_tube_in_a_testing_machine():
+    """Pulled at both lids, it floats as without forces; alone they are refused, nothing holds against them."""
+    mesh = fm.cylinder(2.0, 6, top="hub", bottom="hub")
+    both = pulled(fm.HubForce(0.5, "first"), fm.HubForce(-0.5, "last"), mesh=mesh)
+    potential = potential_of(both)
+    assert potential.space.pin is not None
+    eq = fm.equilibrium(both, volume=7.0)
+    half = pulled(fm.HubForce(0.5, "first"), mesh=fm.cylinder(1.0, 3, top="hub", bottom="mirror"))
+    found = fm.equilibrium(half, volume=3.5)
+    assert found.pressure == pytest.approx(eq.pressure, rel=1e-8)
+    with pytest.raises(fm.InputError, match=r"load.force = 0.5: nothing holds the membrane against it"):
+        pulled(fm.HubForce(0.5, "first"), mesh=mesh)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "load", "message"),
+    [
+        (fm.disc(4), fm.HubForce(1.0), r"load.hub = None: there is no such hub"),
+        (fm.torus(3, 4), fm.HubForce(1.0), r"load.hub = None: there is no such hub"),
+        (fm.annulus(0.3, 4), fm.HubForce(1.0, "last"), r"load.hub = 'last': there is no such hub"),
+        (fm.cylinder(2.0, 4, top="hub", bottom="hub"), fm.HubForce(1.0), r"load.hub = None: missing; there are two hubs"),
+    ],
+)
+def test_a_force_on_no_hub(mesh, load, message):
+    with pytest.raises(fm.InputError, match=message):
+        pulled(load, mesh=mesh)
+
+
+def test_a_force_that_is_none():
+    with pytest.raises(fm.InputError, match=r"load.force = nan: a finite number"):
+        fm.HubForce(float("nan"))
+    with pytest.raises(fm.InputError, match=r"load.hub = 'top': 'first' or 'last'"):
+        fm.HubForce(1.0, "top")
+    plain = Potential(pulled())
+    assert Potential(pulled(fm.HubForce(0.0))).operations == plain.operations
+    assert 0 < Potential(pulled(fm.HubForce(0.3))).operations - plain.operations < 20
+    with_weight, with_both = (Potential(pulled(*loads)) for loads in ([fm.Weight(0.3)], [fm.Weight(0.3), fm.HubForce(0.0)]))
+    assert with_both.operations == with_weight.operations
+    assert len(with_weight.point_data) == len(plain.point_data)
+
+
+def test_a_force_in_files(tmp_path):
+    scene = pulled(fm.HubForce(0.4), fm.Weight(0.1))
+    scene.to_toml(tmp_path / "scene.toml")
+    assert fm.Scene.from_toml(tmp_path / "scene.toml") == scene
+    branch = fm.inflate(scene, volumes=[0.5, 1.0])
+    branch.save(tmp_path / "branch.nc")
+    assert [eq.load_energy for eq in fm.load(tmp_path / "branch.nc")] == [eq.load_energy for eq in branch]
+    assert branch.to_dataframe()["load_energy"].tolist() == [eq.load_energy for eq in branch]
+    parameter = Parameter(scene, "load.0.force")
+    family, member = Family(scene, parameter.vary), Potential(parameter.scene_at(0.7))
+    x = branch[0].state
+    one, other = family.evaluate(x, 1.0, 0.7), member.evaluate(x, 1.0)
+    assert one.energy == pytest.approx(other.energy, rel=1e-13)
+    assert one.gradient == pytest.approx(other.gradient, rel=1e-12, abs=1e-14)
+
+
 # --- stability
 
 

@@ -14,8 +14,9 @@ from scipy.optimize import brentq, minimize_scalar
 import femmembrane as fm
 from femmembrane.discretization.space import Space
 from femmembrane.discretization.supports import SUPPORTS, free_rotations
-from femmembrane.potential import Potential, potential_of
+from femmembrane.potential import Family, Potential, potential_of
 from femmembrane.solve.banded import band_product
+from femmembrane.solve.parameter import Parameter
 from femmembrane.solve.start import guess_at_volume
 from femmembrane.stability.azimuthal import azimuthal_operator
 
@@ -278,8 +279,11 @@ def test_a_slender_torus_is_a_tube() -> None:
 # --- boundary-value problems by collocation
 
 
-def _slopes(pressure: float, R: Any, y: np.ndarray) -> np.ndarray:
-    """d/dS of (rho, eta, F_rho, F_eta) with F = R W1 (cos, sin) of a neo-Hookean meridian, S its reference arc length [paper eq. 39]."""
+def _slopes(pressure: float, R: Any, y: np.ndarray, wire: float = 0.0) -> np.ndarray:
+    """d/dS of (rho, eta, F_rho, F_eta) with F = R W1 (cos, sin) of a neo-Hookean meridian, S its reference arc length [paper eq. 39].
+
+    ``wire`` is chi M: the energy -chi M/(2 rho^2) R dS of a wire on the axis adds its slope, chi M R/rho^3, to dF_rho/dS.
+    """
     rho, _, F_rho, F_eta = y
     l2 = rho / R
     tension = np.hypot(F_rho, F_eta) / R
@@ -288,16 +292,16 @@ def _slopes(pressure: float, R: Any, y: np.ndarray) -> np.ndarray:
         l1 = l1 - (l1 - l1**-3 * l2**-2 - tension) / (1 + 3 * l1**-4 * l2**-2)
     cos, sin = F_rho / (R * tension), F_eta / (R * tension)
     w2 = l2 - l2**-3 * l1**-2
-    return np.stack([l1 * cos, l1 * sin, w2 + pressure * rho * l1 * sin, -pressure * rho * l1 * cos])
+    return np.stack([l1 * cos, l1 * sin, w2 + pressure * rho * l1 * sin + wire * R / rho**3, -pressure * rho * l1 * cos])
 
 
-def _collocated(eq: fm.Equilibrium, R: Any, span: tuple[float, float], ends: Any) -> Any:
+def _collocated(eq: fm.Equilibrium, R: Any, span: tuple[float, float], ends: Any, wire: float = 0.0) -> Any:
     s = np.linspace(*span, 60)
     p = eq.profile(s)
     angle = np.arctan2(np.gradient(p["eta"], s), np.gradient(p["rho"], s))
     force = R(s) * p["mechanical_stress_1"] / p["stretch_1"]
     guess = np.stack([p["rho"], p["eta"], force * np.cos(angle), force * np.sin(angle)])
-    found = solve_bvp(lambda t, y: _slopes(eq.pressure, R(t), y), ends, s, guess, tol=1e-9, max_nodes=20000)
+    found = solve_bvp(lambda t, y: _slopes(eq.pressure, R(t), y, wire), ends, s, guess, tol=1e-9, max_nodes=20000)
     assert found.success
     return found
 
@@ -330,6 +334,95 @@ def test_tube_by_collocation() -> None:
     profile = eq.profile(s)
     assert found.sol(s)[0] == pytest.approx(profile["rho"], abs=2e-7)
     assert found.sol(s)[1] == pytest.approx(profile["eta"], abs=2e-7)
+
+
+def around_a_wire(mesh: Any, strength: float, degree: int = 4) -> fm.Scene:
+    return of(mesh, degree=degree, sources=[fm.Wire(strength)], susceptibility=SUSCEPTIBILITY)
+
+
+def test_torus_around_a_wire_by_collocation() -> None:
+    """Reddy and Saxena (2017): a current along the axis of the torus draws the tube inwards."""
+    eq = fm.equilibrium(around_a_wire(fm.torus(3.0, 32), 0.2), volume=110.0, solver="newton")
+    found = _collocated(
+        eq,
+        lambda s: 3.0 + np.sin(s),
+        (np.pi / 2, 3 * np.pi / 2),
+        lambda a, b: np.array([a[1], a[2], b[1], b[2]]),
+        wire=SUSCEPTIBILITY * 0.2,
+    )
+    s = np.linspace(np.pi / 2, 3 * np.pi / 2, 31)
+    profile = eq.profile(s)
+    assert found.sol(s)[0] == pytest.approx(profile["rho"], abs=1e-7)
+    assert found.sol(s)[1] == pytest.approx(profile["eta"], abs=1e-7)
+    bare = fm.equilibrium(of(fm.torus(3.0, 32), degree=4), volume=110.0, solver="newton")
+    assert profile["rho"].min() < bare.profile(s)["rho"].min() - 0.05
+
+
+def test_tube_around_a_wire_by_collocation() -> None:
+    """Reddy and Saxena (2018); the wire runs through the rigid lid, which the pressure pushes."""
+    eq = fm.equilibrium(around_a_wire(fm.cylinder(4.0, 32, bottom="hub"), 0.02), volume=20.0, solver="newton")
+    found = _collocated(
+        eq,
+        lambda s: np.ones_like(s),
+        (0.0, 4.0),
+        lambda a, b: np.array([a[0] - 1, a[1] - 2, b[0] - 1, b[3] + eq.pressure / 2]),
+        wire=SUSCEPTIBILITY * 0.02,
+    )
+    s = np.linspace(0, 4, 31)
+    profile = eq.profile(s)
+    assert found.sol(s)[0] == pytest.approx(profile["rho"], abs=1e-7)
+    assert found.sol(s)[1] == pytest.approx(profile["eta"], abs=1e-7)
+
+
+def test_a_wire_holds_nothing_along_the_axis() -> None:
+    """Its field is the same at every height: a torus floats as without it. A shift across the axis is no rigid motion any more."""
+    plain = of(fm.torus(3.0, 16), degree=4)
+    pin = potential_of(plain).space.pin
+    assert pin is not None
+    for sources, kept, rotations in (
+        ([fm.Wire(0.2)], pin, (False, False)),
+        ([fm.Uniform(1.0)], pin, (True, True)),  # exerts no force at all
+        ([fm.Wire(0.2), fm.Dipole(1.0, 9.0)], None, (False, False)),
+    ):
+        space = potential_of(plain.replace(sources=sources, susceptibility=1.0)).space
+        assert (space.pin, space.rotations) == (kept, rotations)
+    wire = plain.replace(sources=[fm.Wire(0.2)], susceptibility=1.0)
+    for name in ("source.0.strength", "membrane.susceptibility"):  # followed in a number it floats as well
+        assert Family(wire, Parameter(wire, name).vary).space.pin == pin
+
+
+def test_a_torus_is_drawn_off_its_wire() -> None:
+    """The nearer to the wire the stronger it pulls: as long as it stays centred it is stable, a shift it does not resist."""
+    eq = fm.equilibrium(around_a_wire(fm.torus(3.0, 16), 0.2), volume=110.0)
+    assert eq.verdict("volume").stable is True
+    assert eq.verdict(azimuthal=1).stable is False
+    assert fm.equilibrium(of(fm.torus(3.0, 16), degree=4), volume=110.0).verdict(azimuthal=1).stable is True
+
+
+@pytest.mark.parametrize("aspect", [2.0, 3.0, 3.7])
+def test_a_volume_next_to_the_moderately_inflated_one(aspect: float) -> None:
+    """Where rounding puts that one on the wrong side of its own bound a start came back to itself without end."""
+    scene = around_a_wire(fm.torus(aspect, 8), 0.02)
+    volume = 1.1 * potential_of(scene).space.reference_volume
+    assert fm.equilibrium(scene, volume=volume).volume == pytest.approx(volume, rel=1e-9)
+
+
+def test_a_pulled_hub_by_collocation() -> None:
+    """A neo-Hookean annulus without pressure, its hub lifted by F: at the hub F_eta = -F/(2 pi)."""
+    force = 1.5
+    eq = fm.equilibrium(of(fm.annulus(0.3, 16), degree=6, loads=[fm.HubForce(force)]), pressure=0.0, solver="newton")
+    found = _collocated(eq, lambda s: s, (0.3, 1.0), lambda a, b: np.array([a[0] - 0.3, a[3] + force / (2 * np.pi), b[0] - 1, b[1]]))
+    s = np.linspace(0.3, 1.0, 31)
+    profile = eq.profile(s)
+    assert eq.center_height > 0.2
+    assert found.sol(s)[0] == pytest.approx(profile["rho"], abs=1e-8)
+    assert found.sol(s)[1] == pytest.approx(profile["eta"], abs=1e-8)
+    # the cut at any radius carries the same force along the axis
+    space = eq.potential.space
+    u_s, w_s = space.recovered_slopes(eq.state, space.node_parameters())
+    p = eq.profile(space.node_parameters())
+    carried = 2 * np.pi * space.node_parameters() * p["mechanical_stress_1"] / p["stretch_1"] * -w_s / np.hypot(1 + u_s, w_s)
+    assert carried == pytest.approx(force, rel=1e-7)
 
 
 # --- shapes against each other

@@ -42,8 +42,9 @@ class Space:
     degree : int
     quadrature : int, optional
         Polynomial degree integrated exactly; default 2 degree + 1.
-    anchored : bool
-        Whether something outside, such as a magnetic source, sees where the membrane is: then no motion is rigid, and nothing is pinned.
+    anchored : frozenset of {"along", "across"}
+        Where something outside, such as a magnetic source, sees where the membrane is: motions along the axis, and across it, are then
+        not rigid, and nothing is pinned for them.
 
     Attributes
     ----------
@@ -87,7 +88,7 @@ class Space:
         2 pi times the quadrature weight on the reference element.
     """
 
-    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: bool = False) -> None:
+    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
         self.mesh, self.degree, self.anchored = mesh, degree, anchored
         self.ends: Array = mesh.breakpoints()
         self.sizes: Array = np.diff(self.ends)
@@ -121,22 +122,22 @@ class Space:
         self.n_nodes = n_nodes - int(self.closed)
         adrift = floats(self.supports)
         in_plane = [pole or ("w" in end.held and height == 0) for pole, end, height in zip(on_axis, self.supports, Z, strict=False)]
-        self.loose = adrift and self.anchored
+        self.loose = adrift and "along" in self.anchored
         self.lids = adrift or not all(in_plane)
-        self.rotations = (False, False) if self.anchored else free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
+        across = "across" in self.anchored
+        self.rotations = (False, False) if across else free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
         radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
         middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
         self.widest = self.degree * int(np.lexsort((middle, -np.round(radius / radius.max(), 9)))[0])
-        self.pin = self.widest if adrift and not self.anchored else None
+        self.pin = self.widest if adrift and not self.loose else None
         off_axis = [end for end, pole in zip(self.supports, on_axis, strict=False) if not pole]
         self.spreads = any("u" not in end.held for end in off_axis)
-        self.wall = self._between([R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)])
+        walls = [R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)]
+        self.wall = self.between(walls) if any(walls) else None
         self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
 
-    def _between(self, at_ends: list[float]) -> tuple[Array, Array] | None:
-        """A linear function of the meridian and its slope along the reference element, from values at its ends; None for zeros."""
-        if not any(at_ends):
-            return None
+    def between(self, at_ends: list[float]) -> tuple[Array, Array]:
+        """A linear function of the meridian and its slope along the reference element, from values at its ends."""
         slope = (at_ends[1] - at_ends[0]) / (self.ends[-1] - self.ends[0])
         return at_ends[0] + slope * (self.s - self.ends[0]), np.broadcast_to(slope * self.sizes, self.s.shape)
 
@@ -395,7 +396,7 @@ class Space:
 
 
 @lru_cache(maxsize=32)
-def space_of(mesh: Meridian, degree: int, anchored: bool = False) -> Space:
+def space_of(mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset()) -> Space:
     """The space of a mesh and a degree, built once."""
     return Space(mesh, degree, anchored=anchored)
 
@@ -405,10 +406,11 @@ def space_of_scene(scene: Any) -> Space:
     return space_of(scene.mesh, scene.degree, anchored(scene))
 
 
-def anchored(scene: Any) -> bool:
-    """Whether something outside the membrane of a scene sees where it is: a source or load, unless it does nothing."""
-    magnetic = bool(scene.susceptibility) and any(getattr(source, "strength", 1.0) != 0 for source in scene.sources)
-    return magnetic or any(load.acts for load in scene.loads)
+def anchored(scene: Any) -> frozenset[str]:
+    """In which directions something outside the membrane of a scene sees where it is: a source or load, unless it does nothing."""
+    sources = [s for s in scene.sources if getattr(s, "strength", 1.0) != 0] if scene.susceptibility else []
+    acting = [*sources, *(load for load in scene.loads if load.acts)]
+    return frozenset().union(*(part.sees for part in acting))
 
 
 def band_of(gather: NDArray[np.int64], n_free: int) -> int:

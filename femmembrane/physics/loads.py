@@ -5,12 +5,13 @@ per reference area and a function g of the height per area projected onto the pl
 
     E = Int f(rho, eta) R dS + Int g(eta) rho d rho,      both with the 2 pi
 
-so that g acts like the pressure -g'(eta). A new load is a class here with one of the two, and a line in the registry of scenes.
+so that g acts like the pressure -g'(eta), and a function of the heights of rigid hubs. A new load is a class here with one of these, and a
+line in the registry of scenes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,8 +41,20 @@ def wall_density(wall: Any, wall_s: Any, w: Any, w_s: Any) -> Any:
     return (wall * w_s + wall_s * w) / 2
 
 
+def hub_density(forces: tuple[Any, Any], hub: Any, hub_s: Any, z: Any, z_s: Any) -> Any:
+    """Integrand of -F_0 z_0 - F_1 z_1, the energy of forces along the axis on the first and the last end, at the heights z_0 and z_1.
+
+    ``hub`` is linear along the meridian, from -1 to 0: then F_0 z_0 + F_1 z_1 = Int d/ds [(F_0 hub + F_1 (hub + 1)) z] ds.
+    """
+    first, last = forces
+    return -(first * hub + last * (hub + 1)) * z_s - (first + last) * hub_s * z
+
+
 class Load:
     """A load besides the pressure: no load at all, unless a method says otherwise."""
+
+    #: motions of the membrane as a whole, "along" the axis and "across" it, on which it works
+    sees: frozenset[str] = frozenset({"along", "across"})
 
     @property
     def acts(self) -> bool:
@@ -55,6 +68,10 @@ class Load:
     def over_projection(self, eta: Any) -> tuple[Any, Any, Any]:
         """(g, g', g'') at a height: energy per projected area with its derivatives."""
         return 0.0, 0.0, 0.0
+
+    def on_hubs(self, hubs: Sequence[bool]) -> tuple[Any, Any]:
+        """Force along the axis on the first and the last end; ``hubs`` tells which of them are rigid hubs."""
+        return 0.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -115,6 +132,58 @@ class Weight(Load):
 
     def over_reference(self, rho: Any, eta: Any) -> Any:
         return self.weight * eta
+
+
+@dataclass(frozen=True)
+class HubForce(Load):
+    """A force along the axis on a rigid hub, dead: E = -F times the height of the hub.
+
+    Parameters
+    ----------
+    force : float
+        F over mu T R0; it lifts the hub, along the axis, when positive.
+    hub : {"first", "last"}, optional
+        Which hub of two, as the meridian runs (of a cylinder the first is its top); left out: the only one.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite and for another word; a scene refuses it where the shape has no such hub.
+    """
+
+    force: float
+    hub: str | None = None
+
+    sees = frozenset()
+
+    def __post_init__(self) -> None:
+        if not is_number(self.force):
+            raise InputError("load.force", self.force, "a finite number is allowed (over mu T R0; positive lifts the hub)")
+        if self.hub is not None and (not isinstance(self.hub, str) or self.hub not in _HUBS):
+            raise InputError("load.hub", self.hub, "'first' or 'last' is allowed, or nothing where there is one hub")
+
+    @property
+    def acts(self) -> bool:
+        return not (is_number(self.force) and self.force == 0)
+
+    def on_hubs(self, hubs: Sequence[bool]) -> tuple[Any, Any]:
+        """As :meth:`Load.on_hubs`; InputError where the hub is missing, or which of two is meant."""
+        places = [k for k, is_hub in enumerate(hubs) if is_hub and self.hub in (None, _HUBS[k])]
+        if not places:
+            raise InputError("load.hub", self.hub, 'there is no such hub; a shape with an end that is a hub is allowed (inner = "hub")')
+        if len(places) > 1:
+            raise InputError("load.hub", None, "missing; there are two hubs: 'first' or 'last' is allowed")
+        return (self.force, 0.0) if places == [0] else (0.0, self.force)
+
+
+#: names of the ends of a meridian
+_HUBS = ("first", "last")
+
+
+def on_hubs(loads: Iterable[Load], hubs: Sequence[bool]) -> tuple[Any, Any]:
+    """Sums of the forces on the first and the last end."""
+    forces = [load.on_hubs(hubs) for load in loads if type(load).on_hubs is not Load.on_hubs]
+    return sum(f[0] for f in forces), sum(f[1] for f in forces)
 
 
 def over_reference(loads: Iterable[Load], rho: Any, eta: Any) -> Any:

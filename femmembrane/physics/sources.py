@@ -146,6 +146,7 @@ class Wire(Source):
     strength: float
     orientation: int = 1
 
+    sees = frozenset({"across"})
     refusal = (
         "kind",
         "the wire runs along the axis, where its field is singular, and pierces the pole; a membrane without a pole is allowed",
@@ -186,6 +187,8 @@ class Uniform(Source):
 
     strength: float
     orientation: int = 1
+
+    sees = frozenset()
 
     def __post_init__(self) -> None:
         check_source(self)

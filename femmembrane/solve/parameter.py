@@ -184,6 +184,10 @@ class _Scaled:
     source: Any
     factor: Any
 
+    @property
+    def sees(self) -> frozenset[str]:
+        return frozenset(self.source.sees)
+
     def field(self, rho: Any, eta: Any) -> tuple[Any, ...]:
         amplitude = np.sqrt(self.factor + _TINY)
         return tuple(amplitude * component for component in self.source.field(rho, eta))

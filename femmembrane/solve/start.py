@@ -122,7 +122,8 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     if surrounded and potential.space.loose:
         return _from_unanchored(potential, volume)
     failure = None
-    if surrounded and abs(volume - rest) < moderate(potential):
+    # less a margin: rest + moderate - rest, what is inflated to from here, may be rounded down
+    if surrounded and abs(volume - rest) < moderate(potential) * (1 - 1e-12):
         try:
             return _from_either_side(volume, lambda first, state: march(potential, state, VolumeControl, first, volume)[-1], potential)
         except SolveError as error:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -72,6 +74,38 @@ def there_and_back() -> float:
     loads = [*np.linspace(2.0, 60.0, 7), *np.linspace(60.0, 2.0, 11)[1:]]
     run = fm.inflate(disc_scene(dipole=ABOVE, elements=8), volumes=loads)
     return deviation(run[0], run[-1])
+
+
+@FAMILY.case("a mesh file, its nodes in another order", "cells are met in the order of a mesher", Number(0.0), "order")
+@FAMILY.case("a mesh file, cells the other way round", "cells point as a mesher likes", Number(0.0), "cells")
+@FAMILY.case("a mesh file, the curve backwards", "inside and outside are swapped", Number(0.0), "curve")
+def mesh_file(change: str) -> float:
+    """A cap and a torus from a file: the same equilibrium to the last bit."""
+    return max(
+        from_files(mesh, volume, change, seed) for mesh, volume in ((fm.cap(0.5, 8), 1.5), (fm.torus(3.0, 8), 90.0)) for seed in (0, 1)
+    )
+
+
+def from_files(mesh: Any, volume: float, change: str, seed: int) -> float:
+    """Deviation of the equilibrium on a mesh file from that on the file with the same curve in another order."""
+    import meshio
+
+    with tempfile.TemporaryDirectory() as folder:
+        one, other = Path(folder, "one.vtu"), Path(folder, "other.vtu")
+        fm.write_meridian(mesh, one)
+        read = meshio.read(one)
+        points, cells, rng = read.points, read.cells_dict["line3"], np.random.default_rng(seed)
+        if change == "order":
+            new = rng.permutation(len(points))
+            points = points[np.argsort(new)]
+            cells = rng.permutation(new[cells])
+        elif change == "cells":
+            cells[1::2] = cells[1::2][:, [1, 0, 2]]
+        else:
+            cells = cells[::-1, [1, 0, 2]]
+        meshio.Mesh(points, [("line3", cells)]).write(other)
+        scenes = [fm.Scene(material=fm.NeoHookean(), mesh=fm.read_meridian(path)) for path in (one, other)]
+    return deviation(*(fm.equilibrium(scene, volume=volume, solver="newton") for scene in scenes))
 
 
 PROGRAM = """

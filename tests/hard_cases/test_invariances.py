@@ -10,7 +10,7 @@ from hypothesis import given, settings
 import femmembrane as fm
 
 from ..cases import OGDEN, disc_scene
-from .invariance import deviation
+from .invariance import deviation, from_files
 
 FEW = settings(max_examples=8, derandomize=True, deadline=None, database=None)
 
@@ -72,6 +72,13 @@ def test_bisection_never_raises_the_minimum(volume, elements, degree, material):
     """The spaces are nested; quadrature is exact to far less than the gain, or both are at round-off."""
     coarse, fine = (state(disc_scene(material, elements=n, degree=degree), volume).energy for n in (2 * elements, 4 * elements))
     assert fine <= coarse + 1e-9 * coarse
+
+
+@given(st.floats(1.0, 3.0), st.floats(0.1, 1.0), st.integers(0, 2**32 - 1))
+@FEW
+def test_the_order_of_a_mesh_file(volume, height, seed):
+    """Nodes and cells of a cap in any order, to the last bit."""
+    assert from_files(fm.cap(height, 6), volume, "order", seed) == 0
 
 
 @given(volumes, st.lists(volumes, min_size=1, max_size=3))

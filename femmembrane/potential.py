@@ -96,6 +96,9 @@ class Potential:
         fixed = anchored(scene)
         self.space = space_of(scene.mesh, scene.degree, fixed) if quadrature is None else Space(scene.mesh, scene.degree, quadrature, fixed)
         space = self.space
+        if not space.n_free:
+            advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
+            raise InputError("mesh.elements", space.n_elements, advice)
         # a source of no strength is none: nothing of it is built
         self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
         self.loads = tuple(load for load in scene.loads if load.acts)

@@ -217,7 +217,7 @@ def test_no_load():
 
 
 def test_a_membrane_that_sags_at_no_pressure_does_not_pass_the_flat_state() -> None:
-    """A liquid lighter than what is outside lifts the membrane: the flat state is in equilibrium, but unstable, and no state leads to it."""
+    """A liquid lighter than what is outside lifts the membrane: the flat state is in equilibrium but unstable, no state leads to it."""
     scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(elements=8), loads=[fm.Hydrostatic(-1.0)])
     down = fm.pressurize(scene, pressures=[0.3, 0.0, -0.01])
     assert [eq.verdict("pressure").stable for eq in down] == [True] * 3

@@ -26,7 +26,7 @@ from ..solve.state import Path, State, at_rest, distance, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
-from .arguments import check_height
+from .arguments import check_height, check_scene
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
 from .trace import resume_trace, trace
@@ -165,6 +165,7 @@ def run(
     InputError
         When the scene has no [run], or ``unfinished`` belongs to another scene.
     """
+    check_scene(scene)
     if scene.run is None:
         raise InputError("run", None, 'a [run] table is required, for instance control = "volume", start = 0.5, stop = 75.0, steps = 60')
     asked = scene.run

@@ -43,7 +43,6 @@ class Elements:
         parameters: Array,
         tolerance: float,
         residual: float,
-        unbalanced: float,
         max_iterations: int,
         gradients: Array,
         densities: Array,

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -96,6 +97,9 @@ class Potential:
         fixed = anchored(scene)
         self.space = space_of(scene.mesh, scene.degree, fixed) if quadrature is None else Space(scene.mesh, scene.degree, quadrature, fixed)
         space = self.space
+        if not space.n_free:
+            advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
+            raise InputError("mesh.elements", space.n_elements, advice)
         # a source of no strength is none: nothing of it is built
         self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
         self.loads = tuple(load for load in scene.loads if load.acts)
@@ -467,6 +471,7 @@ class _Kernel:
         self._local = np.ones((self.n_blocks, function.numel_in(1), self.block))
         self._parameters = np.zeros(function.numel_in(2))
         self._out = np.zeros((self.n_blocks, self.rows, self.block))
+        self._lock = Lock()
         self._buffer, self._call = vector.buffer()
         for k, array in enumerate((self._data, self._local, self._parameters)):
             self._buffer.set_arg(k, memoryview(array))  # type: ignore[arg-type, call-arg]
@@ -478,8 +483,11 @@ class _Kernel:
         return np.ascontiguousarray(padded.reshape(len(rows), self.n_blocks, self.block).transpose(1, 0, 2))
 
     def __call__(self, local: Array, parameters: Array) -> Array:
-        """Values at all points, shape (rows, n); valid until the next call."""
-        local = local.reshape(-1, self.n)
+        """Values at all points, shape (rows, n)."""
+        with self._lock:  # threads that work on one scene share the buffers
+            return self._answer(local.reshape(-1, self.n), parameters).copy()
+
+    def _answer(self, local: Array, parameters: Array) -> Array:
         self._local[...] = local if self.n_blocks == 1 else self._split(local)
         self._parameters[:] = parameters
         self._call()

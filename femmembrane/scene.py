@@ -454,7 +454,7 @@ class Scene:
         InputError
             When the file cannot be read, is no TOML (with the line), or does not describe a scene.
         """
-        return cls.from_dict(_read_toml(Path(path)), Path(path).parent)
+        return cls.from_dict(read_tables(path), Path(path).parent)
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a scene file that :meth:`from_toml` reads back to an equal scene.
@@ -474,7 +474,15 @@ class Scene:
 # --- reading and writing tables
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
+    """The tables of a scene file as they stand, unchecked: what :meth:`Scene.from_dict` takes.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is no TOML (with the line).
+    """
+    path = Path(path)
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)

@@ -177,12 +177,11 @@ def test_accuracy_out_of_reach(monkeypatch):
 def test_loads_out_of_reach():
     """The mesh is chosen by what can be reached; if that is nothing, the run says why as it would on any mesh."""
     scene = asking(disc_scene(OGDEN), 1e-6)
-    branch = fm.pressurize(scene, pressures=[1.8, 1.95], throw=False)
-    assert (len(branch), branch.status) == (1, fm.Status.NO_EQUILIBRIUM)
-    assert branch[0].error_estimate().pressure.relative < 1e-6
     with pytest.raises(fm.SolveError, match=r"pressure 1.95 was not reached") as e:
         fm.pressurize(scene, pressures=[1.8, 1.95])
-    assert len(e.value.result) == 1
+    branch = e.value.result
+    assert (len(branch), branch.status) == (1, fm.Status.NO_EQUILIBRIUM)
+    assert branch[0].error_estimate().pressure.relative < 1e-6
     with pytest.raises(fm.SolveError, match=r"pressure -500 was not reached"):
         fm.pressurize(asking(ABOVE, 1e-6), pressures=[-500.0])
 

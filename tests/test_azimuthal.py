@@ -412,3 +412,14 @@ def test_inertia_agrees_with_the_smallest_eigenvalue() -> None:
         operator = azimuthal_operator(eq.potential, eq.state, eq.pressure, n)
         found = azimuthal_eigenvalue(eq.potential, eq.state, eq.pressure, n)
         assert negative_directions(operator.band, operator.half_bandwidth) == found.negative == (found.value < 0)
+
+
+@pytest.mark.parametrize("mesh", [fm.cap(0.5, elements=4, rim="free"), fm.annulus(0.3, elements=4, inner="free", outer="free")])
+def test_a_free_edge_of_the_largest_radius(mesh: Any) -> None:
+    """Rigid motions are held at the edge itself: its film adds to the operator what is left there, symmetric and finite."""
+    potential = potential_of(fm.Scene(material=fm.NeoHookean(), mesh=mesh))
+    x = np.zeros(potential.space.n_free)
+    for n in (1, 2):
+        with_film, without = (azimuthal_operator(potential, x, pressure, n) for pressure in (0.1, 0.0))
+        assert np.isfinite(with_film.band).all()
+        assert not np.array_equal(with_film.band, without.band)

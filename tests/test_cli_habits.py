@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -47,7 +48,18 @@ def test_the_wheel_has_the_scenes_where_they_are_looked_for() -> None:
     tools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
     wheel = tools.get("hatch", {}).get("build", {}).get("targets", {}).get("wheel", {})
     data = tools.get("setuptools", {}).get("data-files", {})
-    assert wheel.get("sources") == {"demos": "femmembrane/scenes"} or data == {"share/femmembrane/scenes": ["demos/*.toml"]}
+    assert wheel.get("sources") == {"demos": "femmembrane/scenes"} or data.get("share/femmembrane/scenes") == ["demos/*.toml"]
+
+
+def test_the_wheel_has_the_mesh_files_of_its_scenes() -> None:
+    """Where they are looked for, from the folder of the scene."""
+    data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["data-files"]
+    brought = {(Path(place) / file.name).as_posix() for place, patterns in data.items() for glob in patterns for file in ROOT.glob(glob)}
+    tables = [tomllib.loads(path.read_text(encoding="utf-8")) for path in (ROOT / "demos").glob("*.toml")]
+    files = [table["mesh"]["file"] for table in tables if "file" in table.get("mesh", {})]
+    assert files
+    for file in files:
+        assert os.path.normpath(f"share/femmembrane/scenes/{file}").replace(os.sep, "/") in brought
 
 
 def test_a_new_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

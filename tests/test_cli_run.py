@@ -83,6 +83,21 @@ def test_limit_point_is_exit_code_3_with_what_was_computed(tmp_path, capfd):
     assert json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))["status"] == "no equilibrium"
 
 
+@pytest.mark.parametrize("words", [["run"], ["convergence"], ["cost"], ["sweep", "--over", "mesh.degree=1,2"]])
+def test_set_is_refused_with_the_nearest_name_by_every_command(words, tmp_path, capfd):
+    assert main([*words, "neo-hookean", "--out", str(tmp_path), "--set", "mesh.elemnts=8"]) == 2
+    assert "mesh.elemnts = 8: unknown; did you mean 'elements'?" in capfd.readouterr().err
+
+
+def test_set_takes_the_place_of_what_the_file_has(tmp_path):
+    """And is part of the command that the record keeps."""
+    run = 'run={control="volume",values=[0.5,1],solver="newton"}'
+    assert main(["run", "neo-hookean", "--set", "mesh.elements=4", "--set", run, "--set", "title=Small one", "--out", str(tmp_path)]) == 0
+    facts = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))
+    assert (facts["scene"]["mesh"]["elements"], facts["scene"]["title"], facts["equilibria"]) == (4, "Small one", 2)
+    assert f"--set mesh.elements=4 --set '{run}' --set 'title=Small one'" in facts["command"]
+
+
 def test_jump_goes_on(tmp_path):
     run = '[run]\ncontrol = "pressure"\nvalues = [1.8, 1.95]\nat_limit = "jump"\n'
     assert main(["run", str(scene_file(tmp_path, run)), "--out", str(tmp_path / "out")]) == 0

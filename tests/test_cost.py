@@ -369,3 +369,10 @@ def test_command_fails(tmp_path, capfd, rest, code, message):
     assert err.count("\n") == 1
     assert message in err
     assert not (tmp_path / "out" / "cost.csv").exists()
+
+
+def test_another_meridian_is_measured_in_silence():
+    """The independent methods are for the disc, and so is their guess, at radii which an annulus has not (warnings are errors here)."""
+    scene = fm.Scene(fm.NeoHookean(), fm.annulus(0.3, elements=8))
+    study = fm.cost(scene, volume=0.5, degrees=(1,), elements=(4, 8), solvers=("newton",), reference_elements=8, repeat=1, parts=False)
+    assert {line.method for line in study.lines if line.what == "solve"} == {"newton"}

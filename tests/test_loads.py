@@ -327,3 +327,18 @@ def test_tables(tables, message):
 def test_no_load():
     with pytest.raises(fm.InputError, match=r"load = <class .*a load is allowed"):
         loaded(fm.Weight)
+
+
+def test_a_membrane_that_sags_at_no_pressure_does_not_pass_the_flat_state() -> None:
+    """A liquid lighter than what is outside lifts the membrane: the flat state is in equilibrium but unstable, no state leads to it."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(elements=8), loads=[fm.Hydrostatic(-1.0)])
+    down = fm.pressurize(scene, pressures=[0.3, 0.0, -0.01])
+    assert [eq.verdict("pressure").stable for eq in down] == [True] * 3
+    assert down[1].volume == pytest.approx(fm.equilibrium(scene, pressure=1e-6).volume, rel=1e-4)
+    assert 0 < down[2].volume < down[1].volume
+    assert fm.equilibrium(scene, pressure=0.0).volume == pytest.approx(down[1].volume, rel=1e-9)
+    with pytest.raises(fm.SolveError, match="limit point"):
+        fm.pressurize(scene, pressures=[0.3, -0.1])
+    on = fm.pressurize(scene, pressures=[0.0, 0.01], start=down[1])
+    assert on[0].volume == pytest.approx(down[1].volume, rel=1e-9)
+    assert on[1].volume > on[0].volume

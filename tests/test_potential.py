@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -279,3 +281,14 @@ def test_potential_is_built_once_per_physics():
     same = scene.replace(title="another", analysis=fm.Analysis(stability=["volume"]), radius_to_thickness=50.0)
     assert potential_of(scene) is potential_of(same)
     assert potential_of(scene) is not potential_of(scene.replace(degree=3))
+
+
+def test_threads_share_a_potential() -> None:
+    """What one thread is answered does not change under the hands of another (CasADi lets them run at the same time)."""
+    potential = potential_of(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(elements=200), loads=[fm.Weight(0.1)]))
+    s = potential.space.interpolation_points()
+    states = [potential.space.interpolate(0.0 * s, k * (1 - s**2)) for k in (0.1, 0.3)]
+    expected = [potential.load_energy(x) for x in states]
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(lambda k: {potential.load_energy(states[k]) for _ in range(100)}, (0, 1)))
+    assert found == [{value} for value in expected]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 import femmembrane as fm
 from femmembrane.discretization.space import Space
 from femmembrane.discretization.supports import SUPPORTS, free_rotations
+from femmembrane.errors import Status
 from femmembrane.potential import Family, Potential, potential_of
 from femmembrane.solve.banded import band_product
 from femmembrane.solve.parameter import Parameter
@@ -197,6 +199,17 @@ def test_onset_of_the_pear() -> None:
 
 
 @cache
+def test_a_balloon_is_traced_past_its_pears() -> None:
+    """Where a branch of pears crosses, round or back to round, one wave sets in as well: the same pear with its stalk to the side."""
+    scene = fm.Scene.from_toml(Path(__file__).parents[1] / "demos" / "balloon.toml")
+    branch = fm.run(scene)
+    assert branch.status == Status.CONVERGED
+    crossings = [p.volume for p in branch.special_points if p.kind == "branch_point"]
+    onsets = [p.volume for p in branch.special_points if p.kind == "azimuthal_onset" and p.azimuthal == 1]
+    assert len(crossings) == 2
+    assert onsets == pytest.approx(crossings, rel=1e-4)
+
+
 def balloon(stretch: float) -> fm.Equilibrium:
     return fm.equilibrium(of(fm.sphere(12), one_term(1.0), degree=4), volume=BALL * stretch**3, solver="newton")
 

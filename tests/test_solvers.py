@@ -215,3 +215,22 @@ def test_a_low_pole_above_a_strong_dipole_is_reached_from_the_inflated_side(heig
 def test_where_neither_side_leads_the_first_reason_is_given():
     with pytest.raises(fm.SolveError, match=r"at V = -0\.5"):
         fm.equilibrium(disc_scene(OGDEN, (600.0, -1.2), elements=16), center_height=-0.3)
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        lambda scene: fm.inflate(scene, volumes=[1.0]),
+        lambda scene: fm.pressurize(scene, pressures=[1.0]),
+        lambda scene: fm.equilibrium(scene, volume=1.0),
+        lambda scene: fm.trace(scene, start=0.5, until={"volume": 1.0}),
+        lambda scene: fm.equilibria(scene, volume=1.0),
+        lambda scene: fm.convergence(scene, volume=1.0),
+        lambda scene: fm.cost(scene, volume=1.0),
+        lambda scene: fm.fold_curve(scene, start=1.0, parameter="x", bounds=(0.0, 1.0)),
+        fm.run,
+    ],
+)
+def test_the_path_of_a_scene_is_no_scene(verb):
+    with pytest.raises(fm.InputError, match=r"scene = 'x\.toml': a Scene is allowed"):
+        verb("x.toml")

@@ -233,3 +233,9 @@ def test_quadrature_matters_less_than_the_mesh(degree, name):
     result = correct(finer, VolumeControl(point.expected["volume"]), eq.state, eq.pressure)
     assert result.status is fm.Status.CONVERGED
     assert abs(result.pressure - eq.pressure) < abs(eq.pressure - point.expected["pressure"])
+
+
+@pytest.mark.parametrize(("mesh", "degree"), [(fm.sphere(elements=1), 2), (fm.annulus(0.3, elements=1, inner="clamped"), 1)])
+def test_a_mesh_that_holds_no_shape_is_refused(mesh, degree):
+    with pytest.raises(fm.InputError, match=r"mesh\.elements"):
+        fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=mesh, degree=degree), volume=5.0)

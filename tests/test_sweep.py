@@ -20,7 +20,7 @@ from femmembrane.cli import main
 from femmembrane.errors import InputError
 from femmembrane.results.kept import Kept
 from femmembrane.verbs import pool
-from femmembrane.verbs.keys import set_key, values_of
+from femmembrane.verbs.keys import set_all, set_key, values_of
 from femmembrane.verbs.quantities import QUANTITIES, UNEXPECTED, Options, Row, compute
 from femmembrane.verbs.sweep import KEPT
 
@@ -83,6 +83,30 @@ def test_values_on_the_command_line():
     for text in ("source.0.height", "=1", "a=1:2", "a=1:2:x", "a=1:1:3", "a=1:2:1", "a=nan:1:3"):
         with pytest.raises(InputError):
             values_of("--over", text)
+
+
+def test_values_in_place_of_those_of_a_file():
+    tables = below().to_dict()
+    texts = ["mesh.elements = 7", "run.until={volume=10}", "title=a = b", "run.max_steps=9", f"{STRENGTH}=50", "material.mu=[1, 2"]
+    found = set_all("--set", tables, texts)
+    assert (found["mesh"]["elements"], found["title"], found["source"][0]["strength"]) == (7, "a = b", 50)
+    assert found["run"]["until"] == {"volume": 10}
+    assert found["material"]["mu"] == "[1, 2"  # which the scene refuses by its own name
+    assert set_all("--set", tables, ["title=1\nmesh=2", "run.start=" + "1" * 5000])["title"] == "1\nmesh=2"
+    assert tables == below().to_dict()
+    for text, said in (
+        ("mesh.elements", "KEY=VALUE"),
+        ("mesh.elements=", "KEY=VALUE"),
+        ("=1", "KEY=VALUE"),
+        ("mesh.elements.x=1", "no keys below it"),
+        ("source.1.height=1", "places 0 to 0"),
+        ("load.0.weight=1", "there is no load"),
+    ):
+        with pytest.raises(InputError, match=said) as error:
+            set_all("--set", tables, [text])
+        assert error.value.key == "--set"
+    with pytest.raises(InputError, match="each key once"):
+        set_all("--set", tables, ["title=a", "title=b"])
 
 
 @pytest.mark.parametrize(

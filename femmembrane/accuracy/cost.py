@@ -392,8 +392,9 @@ def _raising(error: SolveError) -> Callable[[str, Potential], State]:
 
 def method_jobs(course: Course, methods: Sequence[str], tolerances: Mapping[str, Sequence[float]]) -> list[Job]:
     """Jobs of the independent methods, all warm; none for a tension field or another meridian than the disc, which they do not solve."""
-    jobs = []
-    guess = course.guess()
+    if not methods:  # the guess is for the disc
+        return []
+    jobs, guess = [], course.guess()
     for method in methods:
         for tolerance in tolerances[method]:
             line = Measurement("solve", method, "warm", tolerance=tolerance)

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
-from .folders import prepare, read
+from .folders import Changes, prepare, read
 from .interrupts import Interrupts
 from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
 
 
-def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
+def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
     """Solve the last equilibrium that a scene file asks for on many meshes, and write convergence.csv and convergence.png to a folder.
 
     Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 4 results
@@ -30,7 +30,7 @@ def convergence(scene: Path, /, *, out: Path, degrees: str = "1,2,3,4", elements
     """
     from ..scene import MAX_DEGREE
 
-    asked = read(scene)
+    asked = read(scene, changes)
     meshes = {"degrees": _numbers("--degrees", degrees, MAX_DEGREE), "elements": _numbers("--elements", elements)}
     prepare(out)
     from ..results.lock import locked

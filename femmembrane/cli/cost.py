@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
-from .folders import prepare, read
+from .folders import Changes, prepare, read
 from .interrupts import Interrupts
 from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
 
 
-def cost(scene: Path, /, *, out: Path, quick: bool = False) -> int:
+def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False) -> int:
     """Measure error against time of the last equilibrium that a scene file asks for, by every method on every mesh.
 
     Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 4 results could not be written, 130 interrupted;
@@ -26,7 +26,7 @@ def cost(scene: Path, /, *, out: Path, quick: bool = False) -> int:
     quick
         Few meshes, each measured once: seconds in place of minutes.
     """
-    asked = read(scene)
+    asked = read(scene, changes)
     prepare(out)
     from ..results.lock import locked
     from ..verbs.cost import QUICK, asked_load

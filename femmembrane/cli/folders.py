@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from ..errors import InputError, unknown_name
 from .scenes import bundled
@@ -13,13 +16,29 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def read(path: Path, needs_run: bool = True) -> Scene:
-    """The scene of a file, or one that comes with the package, by its name."""
-    from ..scene import Scene
+#: --set of the commands that read a scene
+Changes = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--set",
+        negative=(),
+        help="KEY=VALUE in place of what the scene file has, such as mesh.elements=128 or 'run.until={volume=10}'; may be given again.",
+    ),
+]
+
+
+def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = True) -> Scene:
+    """The scene of a file, or one that comes with the package, by its name; with values of ``--set`` in place of those of the file."""
+    from ..scene import Scene, read_tables
 
     if not path.suffix and not path.exists():
         path = _bundled(str(path))
-    scene = Scene.from_toml(path)
+    tables = read_tables(path)
+    if changes:
+        from ..verbs.keys import set_all
+
+        tables = set_all("--set", tables, changes)
+    scene = Scene.from_dict(tables, path.parent)
     if needs_run and scene.run is None:
         raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
     return scene

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
-from .folders import prepare, read
+from .folders import Changes, prepare, read
 from .interrupts import Interrupts
 from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written
 from .progress import observer
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def run(scene: Path, /, *, out: Path, resume: bool = False, report: bool = False) -> int:
+def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = False, report: bool = False) -> int:
     """Compute the equilibria that a scene file asks for and write them to a folder.
 
     Now and then the branch so far is saved as checkpoint.nc: --resume goes on from there after an interrupt, a kill or a full disk. One run
@@ -41,7 +41,7 @@ def run(scene: Path, /, *, out: Path, resume: bool = False, report: bool = False
     report
         Write report.html as well, one page about the run.
     """
-    asked = read(scene)
+    asked = read(scene, changes)
     prepare(out)
     from ..results.checkpoint import Checkpoints, same_scene, unfinished
     from ..results.lock import locked
@@ -62,7 +62,7 @@ def run(scene: Path, /, *, out: Path, resume: bool = False, report: bool = False
         try:
             if code == INTERRUPTED:
                 checkpoints.save()
-            written = _write(branch, out, scene)
+            written = _write(branch, out, scene, changes or ())
             if report:
                 written.append(write_report(out))
         except (InputError, OSError) as error:
@@ -131,12 +131,13 @@ def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Stat
     return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver)
 
 
-def _write(branch: Branch, out: Path, scene: Path) -> list[Path]:
+def _write(branch: Branch, out: Path, scene: Path, changes: Sequence[str]) -> list[Path]:
     import shlex
 
     from ..results.output import write_run
 
-    return write_run(branch, out, command=shlex.join(["femmembrane", "run", str(scene), "--out", str(out)]))
+    words = ["femmembrane", "run", str(scene), *(word for change in changes for word in ("--set", change)), "--out", str(out)]
+    return write_run(branch, out, command=shlex.join(words))
 
 
 def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .folders import prepare, read
+from .folders import Changes, prepare, read
 from .interrupts import Interrupts
 from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written
 
@@ -25,6 +25,7 @@ def sweep(
     *,
     over: Annotated[list[str], Parameter(negative=())],
     out: Path,
+    changes: Changes = None,
     quantity: str = "branch",
     pressure: float | None = None,
     volume: float | None = None,
@@ -67,7 +68,7 @@ def sweep(
     from ..verbs.sweep import plan_sweep
     from ..verbs.sweep import sweep as compute
 
-    asked = read(scene, needs_run=quantity != "equilibria")
+    asked = read(scene, changes, needs_run=quantity != "equilibria")
     grid: dict[str, Any] = {}
     for text in over:
         key, values = values_of("--over", text)

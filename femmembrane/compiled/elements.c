@@ -10,6 +10,8 @@
 #include <string.h>
 
 #define LANES 4
+/* as in solve/newton.py */
+#define PRESSURE 1e-9
 /* points evaluated in one go: a block and the registers of the tape stay in the processor's cache */
 #define POINTS 256
 /* rows of the point function: energies and volume, two gradients, second derivatives, stresses */
@@ -303,6 +305,16 @@ static double relative_residual(const Elements *s, const double *residual, const
     return largest;
 }
 
+/* whether a correction of P changes no force */
+static int balanced(const Elements *s, double dp, const double *volume_gradient, const double *force, double pressure)
+{
+    double scale[2], largest = 0.0;
+    force_scale(s, force, pressure, scale);
+    for (Py_ssize_t i = 0; i < s->n_free; i++)
+        largest = fabs(volume_gradient[i]) > largest ? fabs(volume_gradient[i]) : largest;
+    return fabs(dp) * largest <= PRESSURE * (scale[0] > scale[1] ? scale[0] : scale[1]);
+}
+
 /* factors of K at the densities, with the column -V' and the row and corner in place; -1 without memory */
 static int bordered(const Elements *s, Border *b, const double *stiffness, const double *volume_gradient, double corner)
 {
@@ -336,13 +348,12 @@ typedef struct {
 
 /* Mirror of solve/newton.py, undamped: what each line is for stands there. */
 static int correct(const Elements *s, const Control *control, double *x, double *parameters, double tolerance, double confirmed,
-                   double unbalanced, int max_iterations, double *gradients, double *density, Border *b, double *work, Result *r)
+                   int max_iterations, double *gradients, double *density, Border *b, double *work, Result *r)
 {
     const Py_ssize_t n = s->n_free, np = s->n_points;
     double *force = work, *dx = force + n, *row = dx + n, corner, previous = HUGE_VAL;
     const double *vg = gradients + n, *stiffness = density + N_FORCE * np;
     double p = parameters[0];
-    int refused = 0;
     r->iterations = r->converged = r->factored = 0;
     evaluate(s, x, parameters, r->values, gradients, density);
     for (;;) {
@@ -361,22 +372,20 @@ static int correct(const Elements *s, const Control *control, double *x, double 
             force[i] = -force[i];
         const double dp = border_solve(b, force, -r->gap, dx), size = relative_size(s, dx, x);
         const int met = control->anywhere || fabs(r->gap) <= 1e-14 * (fabs(dot(b->row, x, n)) + fabs(corner * p));
-        const int done = size <= tolerance && (met || previous <= tolerance);
+        const int done = size <= tolerance && (met || previous <= tolerance) && balanced(s, dp, vg, density, p);
         const int stalled = !(size < HUGE_VAL) || (size > 0.5 * previous && size > 1e3 * tolerance);
         if (done || stalled || r->iterations == max_iterations) {
             r->converged = done;
             r->correction = size;
             r->residual = relative_residual(s, force, density, p);
-            if (refused || !done || r->residual <= unbalanced || r->iterations == max_iterations)
-                break;
-            r->converged = 0, refused = 1;
+            break;
         }
         for (Py_ssize_t i = 0; i < n; i++)
             x[i] += dx[i];
         parameters[0] = p += dp;
         evaluate(s, x, parameters, r->values, gradients, density);
         r->iterations++;
-        const double ratio = size / previous, foretold = size * (previous == HUGE_VAL ? (size < 1.0 ? size : 1.0) : ratio * ratio);
+        const double ratio = size / previous, foretold = size * (previous == HUGE_VAL || previous == 0.0 ? (size < 1.0 ? size : 1.0) : ratio * ratio);
         if (foretold <= tolerance / 10) {
             for (Py_ssize_t i = 0; i < n; i++)
                 force[i] = p * vg[i] - gradients[i];
@@ -556,7 +565,7 @@ static PyObject *elements_assemble(PyObject *self, PyObject *args)
 }
 
 /*
- * correct(control, x, parameters, tolerance, residual, unbalanced, max_iterations, gradients, densities): x is replaced by the solution. Answers
+ * correct(control, x, parameters, tolerance, residual, max_iterations, gradients, densities): x is replaced by the solution. Answers
  * (converged, pressure, elastic, magnetic, volume, iterations, correction, residual, gap, Border or None).
  */
 static PyObject *elements_correct(PyObject *self, PyObject *args)
@@ -566,9 +575,9 @@ static PyObject *elements_correct(PyObject *self, PyObject *args)
     PyObject *asked, *o[4], *answer = NULL;
     Py_buffer x = {0}, p = {0}, g = {0}, d = {0};
     Control control;
-    double tolerance, confirmed, unbalanced;
+    double tolerance, confirmed;
     int most;
-    if (!PyArg_ParseTuple(args, "O!OOdddiOO", &PyTuple_Type, &asked, &o[0], &o[1], &tolerance, &confirmed, &unbalanced, &most, &o[2], &o[3]))
+    if (!PyArg_ParseTuple(args, "O!OOddiOO", &PyTuple_Type, &asked, &o[0], &o[1], &tolerance, &confirmed, &most, &o[2], &o[3]))
         return NULL;
     const int bad = control_init(&control, asked, n) < 0 || take_array(o[0], &x, 'd', n, 1, "x") < 0 ||
                     take_array(o[1], &p, 'd', 2, 1, "parameters") < 0 || take_array(o[2], &g, 'd', 2 * n, 1, "gradients") < 0 ||
@@ -578,7 +587,7 @@ static PyObject *elements_correct(PyObject *self, PyObject *args)
         double *work = malloc(sizeof(double) * 3 * (n + 1));
         BorderObject *border = PyObject_New(BorderObject, types.border);
         const int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0 || work == NULL ||
-                            correct(s, &control, x.buf, p.buf, tolerance, confirmed, unbalanced, most, g.buf, d.buf, &border->border, work, &r) < 0;
+                            correct(s, &control, x.buf, p.buf, tolerance, confirmed, most, g.buf, d.buf, &border->border, work, &r) < 0;
         free(work);
         if (without) {
             PyErr_NoMemory();

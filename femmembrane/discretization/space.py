@@ -20,6 +20,7 @@ from scipy import sparse
 from skfem.element import ElementLineP1, ElementLineP2, ElementLinePp
 from skfem.quadrature import get_quadrature
 
+from ..errors import InputError
 from .meridian import Array, Meridian
 from .supports import as_support, floats, free_rotations
 
@@ -127,6 +128,8 @@ class Space:
         across = "across" in self.anchored
         self.rotations = (False, False) if across else free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
         radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
+        if not radius.max() > 0:
+            raise InputError("mesh.elements", self.n_elements, "a meridian from pole to pole needs 2 or more elements")
         middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
         self.widest = self.degree * int(np.lexsort((middle, -np.round(radius / radius.max(), 9)))[0])
         self.pin = self.widest if adrift and not self.loose else None

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
-#: relative residual above which forces are not in balance, however small the correction of the displacements: the pressure's may be large
-UNBALANCED = 1e-9
+#: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
+PRESSURE = 1e-9
 
 
 @dataclass(slots=True)
@@ -76,7 +76,7 @@ def correct(
     if elements is not None:
         return _compiled(elements, potential, control, x, pressure, magnetic, tolerance, max_iterations)
     evaluation = potential.evaluate(x, pressure, magnetic)
-    previous, iteration, refused = np.inf, 0, False
+    previous, iteration = np.inf, 0
     while True:
         equations = Equations(potential, control, x, pressure, evaluation)
         if not equations.finite:
@@ -85,19 +85,17 @@ def correct(
         size = relative_size(potential, dx, x)
         close, previously_close = size <= tolerance, previous <= tolerance
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
+        done = done and equations.balanced(dp)
         stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
-            result = equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
-            if refused or not done or result.residual <= UNBALANCED or iteration == max_iterations:
-                return result
-            refused = True  # once: on very many elements round-off alone may be above
+            return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
         x, pressure = x + length * dx, pressure + length * dp
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, itself and
-        # what the factors at hand make of it (next to a limit point a small residual may be far from the solution)
-        foretold = size * (min(size, 1.0) if previous == np.inf else (size / previous) ** 2) if length == 1 else np.inf
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x and the correction that the
+        # factors at hand make of it (next to a limit point a small residual may be far from the solution) have the last word
+        foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
             if last.finite and (left := relative_size(potential, last.newton_step()[0], x)) <= tolerance / 10:
@@ -122,7 +120,7 @@ def _compiled(
     x, parameters = x.copy(), np.array([pressure, magnetic], dtype=float)
     numbers = control.numbers(potential.space)
     converged, pressure, elastic, field_energy, volume, iterations, correction, residual, gap, border = elements.correct(
-        numbers, x, parameters, tolerance, RESIDUAL, UNBALANCED, max_iterations, gradients, densities
+        numbers, x, parameters, tolerance, RESIDUAL, max_iterations, gradients, densities
     )
     evaluation = potential.evaluation(x, (elastic, field_energy, volume), gradients, densities, magnetic)
     bordered = None if border is None else CompiledBorder(border)
@@ -157,6 +155,11 @@ class Equations:
             return True
         _, row, corner = self.control.equation(self.potential.space, self.x, self.pressure, self.evaluation)
         return bool(abs(self.gap) <= 1e-14 * (abs(row @ self.x) + abs(corner * self.pressure)))
+
+    def balanced(self, dp: float) -> bool:
+        """Whether a correction of P changes no force."""
+        scale = max(self.potential.force_scale(self.evaluation, self.pressure))
+        return bool(abs(dp) * np.abs(self.evaluation.volume_gradient).max(initial=0.0) <= PRESSURE * scale)
 
     def newton_step(self) -> tuple[Array, float]:
         return self._factored.solve(-self.force, -self.gap)

@@ -30,6 +30,8 @@ _CONTROLS: dict[str, Callable[[float], Control]] = {
 }
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
+#: the least that does: next to a crossing of branches no correction falls below round-off over the distance to it
+_AT_CROSSING = 1e-7
 #: a fold that lies this close to a value, relative to 1 + its size, lies on it
 ON_FOLD = 1e-13
 
@@ -69,7 +71,7 @@ class Segment:
         dual_pressure = (1 - share) * self.a.tangent_pressure + share * self.b.tangent_pressure
         control = ArcLengthControl(dual, dual_pressure, z[:-1], float(z[-1]))
         # as good as round-off lets it be: the pressure of a fold is the last digit that tells its two sides apart
-        for tolerance in (_EXACT, TOLERANCE):
+        for tolerance in (_EXACT, TOLERANCE, _AT_CROSSING):
             result = correct(self.potential, control, z[:-1], float(z[-1]), tolerance=tolerance)
             if result.status is Status.CONVERGED:
                 break
@@ -185,7 +187,8 @@ def branch_point(segment: Segment) -> Located | None:
         except SolveError:  # next to the crossing the equations are all but singular: what is known is the bracket
             break
         low, high = (middle, high) if sign == signs[0] else (low, middle)
-    return Located("branch_point", segment.at(low), (high - low) * segment.length)
+    point = segment.at(low)
+    return Located("branch_point", point, (high - low) * segment.length + point.state.correction)
 
 
 def _bordered_sign(point: BranchPoint) -> int:

@@ -196,13 +196,15 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
         With status NO_EQUILIBRIUM when neither direction crosses the pressure in a minimum.
     """
     if at_rest(potential, "pressure", pressure):
-        return flat_state(potential)
+        flat = flat_state(potential)
+        if not potential.surrounded or negative_directions(flat.evaluation.band, potential.space.half_bandwidth) == 0:
+            return flat
     size, rest, load = moderate(potential), potential.space.reference_volume, pressure
     if potential.flat:
         # a nearly flat membrane obeys P = 3.34 V^3 without sources, and its mirror image carries the opposite pressure; weak ones add to it
         lifted = pressure + _pull(potential)
         nearly = (abs(lifted) / 4) ** (1 / 3)
-        if not potential.surrounded or nearly <= NEARLY_FLAT:
+        if not potential.surrounded or 0 < nearly <= NEARLY_FLAT:
             size, load = min(size, nearly), lifted
     volume, other = (rest + float(np.copysign(size, side * load)) for side in (1, -1))
     found = _through(potential, start_at_volume(potential, volume), pressure)

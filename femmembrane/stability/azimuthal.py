@@ -345,7 +345,7 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
         rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
         i, j = layout.numbers[space.nodes[end], [_A // 2, _B // 2]]
         work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
-        for row, column in ((i, j), (j, i)):
+        for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
     rigid = _rigid_motions(space, layout, response, int(n))
     return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, rigid)

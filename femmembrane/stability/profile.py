@@ -77,12 +77,16 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     s : ndarray, shape (n,)
     """
     space = space_of_scene(scene)
-    u, _, w, _ = space.evaluate(x, s)
+    u, own, w, _ = space.evaluate(x, s)
     u_s, w_s = space.recovered_slopes(x, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
     pole = R == 0  # there u/R is the limit u_s/R_s
+    u_s = np.where(
+        pole & (u_s / np.where(pole, R_s, 1.0) <= -1), own, u_s
+    )  # a recovered slope overshoots where a few elements hold a drawn-out pole
     e1 = meridional_strain(R_s, Z_s, u_s, w_s)
-    e2 = np.log1p(np.where(pole, u_s, u) / np.where(pole, R_s, R))
+    hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
+    e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # between its quadrature points a mesh may be too coarse for a positive radius
     rho, eta = R + u, Z + w
     mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
     h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)

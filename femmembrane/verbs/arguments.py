@@ -9,8 +9,15 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..potential import Potential
+from ..scene import Scene
 
 ILL_POSED = ("stop", "mark")
+
+
+def check_scene(scene: Any) -> None:
+    """Raise InputError for what is no scene, such as the path of its file."""
+    if not isinstance(scene, Scene):
+        raise InputError("scene", scene, "a Scene is allowed; Scene.from_toml reads one from a file")
 
 
 def check_max_steps(max_steps: Any) -> None:

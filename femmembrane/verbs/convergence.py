@@ -18,7 +18,7 @@ from ..solve.newton import correct
 from ..solve.start import moderate
 from ..solve.state import State
 from ..threads import one_thread
-from .arguments import check_increasing
+from .arguments import check_increasing, check_scene
 from .follow import equilibrium, run
 from .recording import record
 from .trace import trace
@@ -71,6 +71,7 @@ def convergence(
         The latter when the equilibrium cannot be found on the scene's own mesh or on the reference; a mesh of the study on which it cannot
         be found is a line in ``messages`` and NaN in the tables.
     """
+    check_scene(scene)
     degrees = check_increasing("degrees", degrees, MAX_DEGREE)
     elements = check_increasing("elements", elements, None)
     if not isinstance(limit_points, bool):

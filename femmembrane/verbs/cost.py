@@ -33,6 +33,7 @@ from ..solve.state import State
 from ..stability.judge import judge
 from ..stability.zones import find_zones
 from ..threads import one_thread
+from .arguments import check_scene
 from .recording import record
 
 #: columns of the table, and the machine with every line so that a table can stand alone
@@ -205,6 +206,7 @@ def cost(
     SolveError
         When the reference cannot be found. A method that fails does not raise: its line says so.
     """
+    check_scene(scene)
     control, load = prescribed(volume, pressure, center_height)
     if load == 0 and not (scene.sources or scene.loads):
         raise InputError(control, load, "a load other than 0 is allowed without sources: the flat membrane has no stiffness to step from")

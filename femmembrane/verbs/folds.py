@@ -22,7 +22,7 @@ from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_
 from ..solve.parameter import Parameter
 from ..solve.state import State
 from ..threads import one_thread
-from .arguments import check_ill_posed, check_max_steps
+from .arguments import check_ill_posed, check_max_steps, check_scene
 from .recording import record
 from .trace import CONTACT
 
@@ -201,6 +201,7 @@ def fold_curve(
     InputError, SolveError
         The latter carries the curve up to the failure as ``result``.
     """
+    check_scene(scene)
     named = Parameter(scene, parameter)
     low, high = _bounds(named, bounds, direction)
     check_ill_posed(ill_posed)

@@ -22,11 +22,11 @@ from ..solve.newton import correct
 from ..solve.search import Limit, beyond_limit
 from ..solve.special_points import ON_FOLD
 from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume
-from ..solve.state import Path, State, at_rest, flat_state, rests_flat
+from ..solve.state import Path, State, at_rest, distance, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
-from .arguments import check_height
+from .arguments import check_height, check_scene
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
 from .trace import resume_trace, trace
@@ -43,6 +43,8 @@ _MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
 #: share of a load at which a path to the flat membrane at rest, or through it, is close enough to leave out the rest
 NEAR_ZERO = 1e-3
+#: by how much the displacement shrinks on that way, at least (the cube root of it without stiffness): else the branch does not lead to rest
+NEAR_REST = 0.5
 
 
 @one_thread
@@ -163,6 +165,7 @@ def run(
     InputError
         When the scene has no [run], or ``unfinished`` belongs to another scene.
     """
+    check_scene(scene)
     if scene.run is None:
         raise InputError("run", None, 'a [run] table is required, for instance control = "volume", start = 0.5, stop = 75.0, steps = 60')
     asked = scene.run
@@ -315,6 +318,18 @@ class _Walk:
                 message = f"the start (V = {start.volume:.6g}, P = {start.pressure:.6g}) is no minimum under {control} control"
                 raise SolveError(message, status=Status.NOT_A_MINIMUM)
 
+    def _begin_before(self, load: float, failure: SolveError) -> None:
+        """Stand at the moderately inflated membrane on the way to a volume at which sources could not be turned on: steps from there reach
+        it, or meet the fold that is the reason."""
+        rest, size = self.potential.space.reference_volume, moderate(self.potential)
+        if self.quantity != "volume" or failure.status.ill_posed or abs(load - rest) <= size or not self.potential.surrounded:
+            raise failure
+        self.load = rest + float(np.copysign(size, load - rest))
+        try:
+            self.state, self.path = self._first(self.load), Path()
+        except SolveError:
+            raise failure from None
+
     def go_on(self, kept: Branch, loads: Array) -> None:
         """Stand where a run through these loads was interrupted."""
         memory = kept.memory
@@ -324,39 +339,59 @@ class _Walk:
 
     def to(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """The state at a load, and where the branch turned back if it had to be left for it."""
-        turn = None
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
-            self.state, self.path = self._first(load), Path()
-        elif self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
-            return self._through_flat(load, jump)
-        elif at_rest(self.potential, self.quantity, load):
-            self.state, self.path = flat_state(self.potential), Path()
-        elif load != self.load:
             try:
-                states = march(self.potential, self.state, self.control_at, self.load, load, path=self.path, corrector=self.corrector)
-                states[-1].iterations = sum(s.iterations for s in states)
-                self.state = states[-1]
-            except SolveError as error:
-                if error.status.ill_posed:
-                    raise
-                turn = self._turn(error, load)
-                if turn.limit.fold is None and turn.limit.landing is not None:
-                    self.state, self.path, self.load = turn.limit.landing, Path(), load
-                    return self.state, None
-                if turn.limit.fold is None and turn.limit.ill_posed is not None:
-                    raise slackness(self.potential, turn.limit.ill_posed) from error
-                if not jump or turn.limit.landing is None:
-                    raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
-                self.state, self.path = turn.limit.landing, Path()
-        self.load = load
+                self.state, self.path = self._first(load), Path()
+            except SolveError as failure:
+                self._begin_before(load, failure)
+                return self.to(load, jump)
+        elif load != self.load and self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
+            return self._through_flat(self.state, load, jump)
+        elif load != self.load and at_rest(self.potential, self.quantity, load):
+            self.state, self.path = flat_state(self.potential), Path()
+        else:
+            return self._along(self.state, load, jump)
+        return self._arrived(self.state, load, None)
+
+    def _along(self, state: State, load: float, jump: bool) -> tuple[State, _Turn | None]:
+        """Along the branch from the state at hand, and off it where it turns back before the load."""
+        if load == self.load:
+            return self._arrived(state, load, None)
+        try:
+            states = march(self.potential, state, self.control_at, self.load, load, path=self.path, corrector=self.corrector)
+        except SolveError as error:
+            if error.status.ill_posed:
+                raise
+            turn = self._turn(error, load)
+            if turn.limit.fold is None and turn.limit.landing is not None:
+                self.state, self.path, self.load = turn.limit.landing, Path(), load
+                return self.state, None
+            if turn.limit.fold is None and turn.limit.ill_posed is not None:
+                raise slackness(self.potential, turn.limit.ill_posed) from error
+            if not jump or turn.limit.landing is None:
+                raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
+            self.path = Path()
+            return self._arrived(turn.limit.landing, load, turn)
+        states[-1].iterations = sum(s.iterations for s in states)
+        return self._arrived(states[-1], load, None)
+
+    def _arrived(self, state: State, load: float, turn: _Turn | None) -> tuple[State, _Turn | None]:
+        self.state, self.load = state, load
         if unresolved := unresolved_source(self.potential, self.state.x):
             raise SolveError(unresolved, status=Status.DIPOLE_CONTACT)
         return self.state, turn
 
-    def _through_flat(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
-        """To the flat membrane at rest, or to the other side of it, where the mirror image of every state is one at the opposite load."""
-        state, turn = self.to(NEAR_ZERO * self.load, jump)
+    def _through_flat(self, before: State, load: float, jump: bool) -> tuple[State, _Turn | None]:
+        """To the flat membrane at rest, or to the other side of it, where the mirror image of every state is one at the opposite load.
+
+        Where loads or sources hold another state in equilibrium at no load, the branch passes there, and is followed as any other.
+        """
+        state, turn = self._along(before, NEAR_ZERO * self.load, jump)
+        rest = np.zeros_like(state.x)
+        if distance(self.potential, state.x, rest) > NEAR_REST * distance(self.potential, before.x, rest):
+            state, later = self._along(state, load, jump)
+            return state, later or turn
         self.path = Path()
         if load == 0:
             self.state, self.load = flat_state(self.potential), load
@@ -364,8 +399,10 @@ class _Walk:
         mirrored = state.x.copy()
         mirrored[self.potential.space.fields[1]] *= -1
         self.load *= -1
-        self.state = State.of(self.corrector(self.potential, self.control_at(self.load), mirrored, -state.pressure))
-        state, later = self.to(load, jump)
+        result = self.corrector(self.potential, self.control_at(self.load), mirrored, -state.pressure)
+        if result.status is not Status.CONVERGED:
+            raise SolveError(f"the state on the other side of the flat membrane was not found at {self.load:.3g}", status=result.status)
+        state, later = self._along(State.of(result), load, jump)
         return state, later or turn
 
     def _flat(self, x: Array) -> bool:

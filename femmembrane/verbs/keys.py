@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,8 @@ def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     *path, last = key.split(".")
     for depth, name in enumerate(path):
         where = name if isinstance(place, dict) else _index(place, key, depth)
+        if name in ("source", "load") and place is changed and name not in place:  # other names are refused with the nearest one, there
+            raise InputError("key", key, f"there is no {name} whose keys could be set; the whole list is allowed, under {name}")
         inner = copy.copy(place.get(where, {}) if isinstance(place, dict) else place[where])  # what is not on the way is shared
         place[where] = inner
         place = inner
@@ -67,11 +69,35 @@ def values_of(option: str, text: str) -> tuple[str, tuple[Any, ...]]:
     return key, tuple(np.linspace(*ends, number).tolist())
 
 
+def set_all(option: str, tables: Mapping[str, Any], texts: Iterable[str]) -> dict[str, Any]:
+    """The tables of a scene with values changed or added by texts KEY=VALUE, one after the other; what is no TOML value is a text.
+
+    Raises
+    ------
+    InputError
+        Naming the option, for another text, a key that leads nowhere, or one that is set twice.
+    """
+    changed, seen = dict(tables), set()
+    for text in texts:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if not (key and value):
+            raise InputError(option, text, "KEY=VALUE is allowed, such as mesh.elements=128 or 'run.until={volume=10}'")
+        if key in seen:
+            raise InputError(option, text, f"{key} is set already; each key once is allowed")
+        seen.add(key)
+        try:
+            changed = set_key(changed, key, _value(value))
+        except InputError as error:
+            raise InputError(option, text, error.allowed) from None
+    return changed
+
+
 def _value(word: str) -> Any:
     try:
-        return tomllib.loads(f"value = {word}")["value"]
-    except tomllib.TOMLDecodeError:
+        found = tomllib.loads(f"value = {word}")
+    except (ValueError, RecursionError):  # ValueError: no TOML, or a whole number of thousands of digits
         return word
+    return found["value"] if len(found) == 1 else word  # more than one: a text of several lines
 
 
 def _index(place: Any, key: str, depth: int) -> int:

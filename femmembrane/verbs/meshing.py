@@ -10,6 +10,7 @@ from ..potential import potential_of
 from ..results.records import Branch, Equilibrium
 from ..scene import Scene
 from ..solve.finer import transferred
+from .arguments import check_scene
 
 #: what is wanted, or a part of it, from a scene with a mesh and a start on it
 FollowFrom = Callable[[Scene, Equilibrium | None], Branch]
@@ -22,9 +23,12 @@ def on_chosen_mesh(
 
     Raises
     ------
+    InputError
+        For what is no scene.
     SolveError
         When no mesh meets the accuracy, or the run yields nothing on a trial mesh.
     """
+    check_scene(scene)
     if not scene.open:
         return scene, start, {}
     clock = time.perf_counter()

@@ -13,7 +13,7 @@ from ..results.records import Equilibrium
 from ..scene import Scene
 from ..solve.search import Search
 from ..threads import one_thread
-from .arguments import check_max_steps
+from .arguments import check_max_steps, check_scene
 from .recording import record
 
 
@@ -75,6 +75,7 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     ------
     InputError
     """
+    check_scene(scene)
     given = {k: v for k, v in (("pressure", pressure), ("volume", volume)) if v is not None}
     if len(given) != 1:
         raise InputError("equilibria", sorted(given), "exactly one of pressure and volume is allowed")

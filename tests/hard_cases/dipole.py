@@ -66,6 +66,16 @@ def traced_into_the_dipole() -> fm.Branch:
     return fm.trace(disc_scene(OGDEN, (200.0, 6.5)), start=0.5, max_steps=1000)
 
 
+@FAMILY.case("trace into a dipole below, 4 linear elements", "a recovered slope overshoots in the spike", Number(1.0), 1, False)
+@FAMILY.case("the same, tension field, degree 3", "a radius below zero between the points of an element", Number(1.0), 3, True)
+def traced_into_the_dipole_below(degree: int, tension_field: bool) -> float:
+    """Whether it ends in contact; all that is known of its states can be asked."""
+    scene = disc_scene(fm.NeoHookean(), (200.0, -3.5), 4, degree).replace(tension_field=tension_field)
+    branch = fm.trace(scene, start=0.5, direction=-1, throw=False)
+    branch.to_xarray()
+    return float(branch.status is fm.Status.DIPOLE_CONTACT)
+
+
 @FAMILY.case("trace down past M = 0.1, h = -0.5", "a weak dipole just below", CLOSE)
 def traced_around_a_weak_dipole() -> fm.Branch:
     return fm.trace(disc_scene(OGDEN, (0.1, -0.5)), start=2.0, direction=-1, max_steps=1000)

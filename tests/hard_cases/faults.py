@@ -129,7 +129,7 @@ def workshop(run: str) -> Iterator[tuple[Path, Path, Path]]:
 @FAMILY.case("killed at any moment, heights, resumed", "the prediction remembers two points", Number(12), "height", 12, 3, slow=True)
 @FAMILY.case("killed at any moment, pressures, resumed", "the membrane snaps on the way", Number(14), "pressure", 14, 2, slow=True)
 @FAMILY.case("killed at any moment, volumes, resumed", "the prediction remembers two points", Number(14), "volume", 14, 1, slow=True)
-@FAMILY.case("killed five times, heights, resumed", "the prediction remembers two points", Number(5), "height", 5, 5)
+@FAMILY.case("killed three times, heights, resumed", "the prediction remembers two points", Number(3), "height", 3, 5)
 def killed(control: str, trials: int, seed: int) -> int:
     """Trials after which every file was whole, and --resume (killed now and then as well) ended with the table of an uninterrupted run."""
     chance = random.Random(seed)

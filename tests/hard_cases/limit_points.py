@@ -118,7 +118,7 @@ FOLD = r"volume fold is P = 1\.93089.*V = 82\.748"
 
 @FAMILY.case("V = fold (1 + 1e-8), steps", "no equilibrium anywhere", Stop(fm.Status.NO_EQUILIBRIUM, FOLD), 1e-8, (80.0,))
 @FAMILY.case("V = 83, steps", "beyond the last volume fold", Stop(fm.Status.NO_EQUILIBRIUM, FOLD), 83 / VOLUME_FOLD - 1, (82.0,))
-@FAMILY.case("V = 83, cold", "the dipole tears it off half-way", Stop(fm.Status.NO_EQUILIBRIUM, "full strength"), 83 / VOLUME_FOLD - 1, ())
+@FAMILY.case("V = 83, cold", "the dipole tears it off half-way", Stop(fm.Status.NO_EQUILIBRIUM, FOLD), 83 / VOLUME_FOLD - 1, ())
 @FAMILY.case("V: 80, 1e4", "a step of 125 times the volume", Stop(fm.Status.NO_EQUILIBRIUM, FOLD), 1e4 / VOLUME_FOLD - 1, (80.0,))
 def beyond_the_volume_fold(share: float, first: tuple[float, ...]) -> fm.Branch:
     return fm.inflate(ABOVE, volumes=[*first, special(ABOVE, "volume_fold").volume * (1 + share)])

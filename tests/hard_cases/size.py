@@ -9,7 +9,7 @@ from femmembrane.accuracy.shooting import shoot
 from femmembrane.accuracy.strong_form import Guess
 
 from ..cases import OGDEN, disc_scene
-from .registry import Exit, Family, Number, Stop, run_file, settled
+from .registry import Exit, Family, Number, Stop, reached, run_file, settled
 
 FAMILY = Family(5, "size")
 
@@ -98,6 +98,15 @@ def huge(load: dict[str, float]) -> fm.Equilibrium:
 def few_elements(elements: int, degree: int) -> float:
     """P at V = 1. Of a cone by hand: stretches sqrt(1 + H^2) and 1, V = pi H/3, P = dW/dV; the others recorded on 2026-11-24."""
     return settled(fm.equilibrium(disc_scene(OGDEN, elements=elements, degree=degree), volume=1.0)).pressure
+
+
+@FAMILY.case("one linear element, by the corrector and traced", "the volume alone fixes the shape, not P", Number((0.0, 0.0), abs=1e-13))
+def cone() -> tuple[float, ...]:
+    """P over that of a cone by hand, 3 H (1 - (1 + H^2)^-2) at V = pi H/3, less one."""
+    scene = disc_scene(NH, elements=1, degree=1)
+    found = [fm.equilibrium(scene, volume=1.0, solver="newton"), reached(fm.trace(scene, start=0.5, until={"volume": 2.0}))[-1]]
+    heights = [3 * eq.volume / np.pi for eq in found]
+    return tuple(settled(eq).pressure / (3 * h * (1 - (1 + h * h) ** -2)) - 1 for eq, h in zip(found, heights, strict=True))
 
 
 @FAMILY.case("one linear element, two waves around the axis", "no unknown has any", Stop("mesh.elements", "two, or degree 2"), 1)

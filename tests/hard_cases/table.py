@@ -20,15 +20,22 @@ def row(case: Case, outcome: Outcome) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + f" | {outcome.seconds:.2g} |"
 
 
-def table(outcomes: Mapping[Case, Outcome]) -> str:
-    """The whole table, one heading a family."""
+def table(cases: Sequence[Case], outcomes: Mapping[Case, Outcome], readme: str) -> str:
+    """The whole table, one heading a family; the line of a case without an outcome is that of the README."""
+    old = {_start(line): line for line in readme.split(BEGIN)[1].split(END)[0].splitlines()}
     lines, family = [], None
-    for case, found in outcomes.items():
+    for case in cases:
         if case.family is not family:
             family = case.family
             lines += ["", f"**{family.number}. {family.name}**", "", HEADING]
-        lines.append(row(case, found))
+        new = row(case, outcomes.get(case, Outcome("", "", 0.0)))
+        lines.append(new if case in outcomes else old.get(_start(new), new))
     return "\n".join(lines[1:])
+
+
+def _start(line: str) -> tuple[str, ...]:
+    """What the registry says of a case: its first three cells."""
+    return tuple(re.split(r"(?<!\\)\|", line)[1:4])
 
 
 def replaced(readme: str, new: str) -> str:

@@ -9,6 +9,7 @@ Indices = NDArray[np.int64]
 
 #: names of the operations of a tape, by their code
 OPERATIONS: tuple[str, ...]
+INTERFACE: int
 
 @final
 class Factor:

@@ -16,15 +16,19 @@ from types import ModuleType
 
 #: environment variable that switches the compiled half off
 SWITCH = "FEMMEMBRANE_COMPILED"
+#: what the sources in ``compiled/`` answer; raised there and here when arguments or answers change
+INTERFACE = 1
 
 
 def _load() -> ModuleType | None:
     if os.environ.get(SWITCH, "1") == "0":
         return None
     try:
-        return importlib.import_module("femmembrane._native")
+        module = importlib.import_module("femmembrane._native")
     except ImportError:
         return None
+    # one that an earlier state of the sources left behind is as good as none
+    return module if getattr(module, "INTERFACE", 0) == INTERFACE else None
 
 
 _module = _load()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from threading import Lock
 from typing import Any
 
 import casadi as ca
@@ -73,29 +74,28 @@ def minimize(
     volume = float(np.abs(scales * evaluation.volume_gradient).max(initial=0.0)) or 1.0
     if isinstance(control, VolumeControl):
         solver, held = _solver(potential, True, max_iterations), 0.0
-        solver.target[:] = control.volume / volume
-        solver.multiplier[:] = -pressure * volume / objective
+        border = control.volume / volume, -pressure * volume / objective
     elif isinstance(control, PressureControl):
-        solver, held = _solver(potential, False, max_iterations), control.pressure
+        solver, held, border = _solver(potential, False, max_iterations), control.pressure, None
     else:
         raise TypeError(f"IPOPT minimises under volume or pressure control, not {type(control).__name__}")
-    solver.parameters[:] = held, magnetic, scale_u, scale_w, objective, volume
-    found, multiplier, iterations, status = solver(x / scales)
+    found, multiplier, iterations, status = solver(x / scales, (held, magnetic, scale_u, scale_w, objective, volume), border)
     return found * scales, -float(multiplier[0]) * objective / volume if multiplier.size else held, iterations, status
 
 
 class _Solver:
     """IPOPT on one problem, called through arrays: turning them into CasADi's matrices and back takes as long as two iterations.
 
-    The next call has the ``parameters``, the ``target`` of the constraint and its ``multiplier`` as they are then.
+    Threads may share one: calls are answered one at a time.
     """
 
     def __init__(self, function: ca.Function) -> None:
         n, m = function.numel_in(0), function.numel_out(2)
-        self._x, self.parameters = np.zeros(n), np.zeros(6)
-        self.target, self.multiplier = np.zeros(m), np.zeros(m)
+        self._lock = Lock()
+        self._x, self._parameters = np.zeros(n), np.zeros(6)
+        self._target, self._multiplier = np.zeros(m), np.zeros(m)
         free = np.full(n, np.inf)
-        self._inputs = (self._x, self.parameters, -free, free, self.target, self.target, np.zeros(n), self.multiplier)
+        self._inputs = (self._x, self._parameters, -free, free, self._target, self._target, np.zeros(n), self._multiplier)
         self._outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
         self._buffer, self._call = function.buffer()
         for k, array in enumerate(self._inputs):
@@ -103,12 +103,17 @@ class _Solver:
         for k, array in enumerate(self._outputs):
             self._buffer.set_res(k, memoryview(array))  # type: ignore[arg-type, call-arg]
 
-    def __call__(self, x: Array) -> tuple[Array, Array, int, str]:
-        """Minimiser, multiplier of the constraint, iterations and IPOPT's return status, from a guess."""
-        self._x[:] = x
-        self._call()
-        stats = self._buffer.stats()
-        return self._outputs[0].copy(), self._outputs[4].copy(), int(stats.get("iter_count", 0)), str(stats["return_status"])
+    def __call__(self, x: Array, parameters: tuple[float, ...], border: tuple[float, float] | None) -> tuple[Array, Array, int, str]:
+        """Minimiser, multiplier of the constraint, iterations and IPOPT's return status, from a guess; ``border`` holds the target of the
+        constraint and a guess of its multiplier."""
+        with self._lock:
+            self._x[:], self._parameters[:] = x, parameters
+            if border is not None:
+                self._target[:], self._multiplier[:] = border
+            self._call()
+            stats = self._buffer.stats()
+            found, multiplier = self._outputs[0].copy(), self._outputs[4].copy()
+        return found, multiplier, int(stats.get("iter_count", 0)), str(stats["return_status"])
 
 
 @lru_cache(maxsize=32)

@@ -102,3 +102,11 @@ def test_help_is_quick() -> None:
     assert roots - set(sys.stdlib_module_names) == {"femmembrane"}
     rooms = {name.split(".")[1] for name in done.stdout.split() if name.startswith("femmembrane.")}
     assert rooms == {"cli", "errors"}
+
+
+def test_a_reader_that_has_seen_enough_is_no_error() -> None:
+    process = subprocess.Popen([sys.executable, "-m", "femmembrane", "scenes"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    assert process.wait() == 0

@@ -8,6 +8,8 @@ inside its functions, for ``--help`` should answer at once.
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError
@@ -55,6 +57,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
+    except BrokenPipeError:  # whoever reads the pipe has seen enough; Python would complain again when it flushes at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
     except (InputError, OSError) as error:
         return fail(BAD_INPUT, str(error))
     except KeyboardInterrupt:

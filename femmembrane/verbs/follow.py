@@ -365,8 +365,8 @@ class _Walk:
                 raise
             turn = self._turn(error, load)
             if turn.limit.fold is None and turn.limit.landing is not None:
-                self.state, self.path, self.load = turn.limit.landing, Path(), load
-                return self.state, None
+                self.path = Path()
+                return self._arrived(turn.limit.landing, load, None)
             if turn.limit.fold is None and turn.limit.ill_posed is not None:
                 raise slackness(self.potential, turn.limit.ill_posed) from error
             if not jump or turn.limit.landing is None:

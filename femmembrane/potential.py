@@ -30,7 +30,7 @@ from .errors import InputError
 from .native import native
 from .physics.kinematics import hencky_strains
 from .physics.loads import Load, hub_density, lidded_volume_density, on_hubs, over_projection, over_reference, volume_density, wall_density
-from .physics.magnetics import Source, magnetic_energy_density, swept
+from .physics.magnetics import Source, acting_sources, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
 
 if TYPE_CHECKING:
@@ -100,8 +100,7 @@ class Potential:
         if not space.n_free:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
-        # a source of no strength is none: nothing of it is built
-        self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if scene.susceptibility else ()
+        self.sources = acting_sources(scene.sources, scene.susceptibility)  # nothing is built of others
         self.loads = tuple(load for load in scene.loads if load.acts)
         if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
             advice = (

@@ -28,7 +28,7 @@ from ..discretization.meridian import Disc
 from ..errors import InputError
 from ..physics.checks import is_number
 from ..physics.loads import over_projection, over_reference
-from ..physics.magnetics import magnetic_energy_density
+from ..physics.magnetics import acting_sources, magnetic_energy_density
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ class StrongForm:
             raise InputError("mesh.shape", getattr(scene.mesh, "shape", scene.mesh), "the disc is allowed")
         self.material = scene.material
         self.susceptibility = scene.susceptibility or 0.0
-        self.sources = tuple(s for s in scene.sources if getattr(s, "strength", 1.0) != 0) if self.susceptibility else ()
+        self.sources = acting_sources(scene.sources, self.susceptibility)
         self.loads = tuple(load for load in scene.loads if load.acts)
         self.evaluations = 0
 

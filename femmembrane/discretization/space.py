@@ -21,6 +21,7 @@ from skfem.element import ElementLineP1, ElementLineP2, ElementLinePp
 from skfem.quadrature import get_quadrature
 
 from ..errors import InputError
+from ..physics.magnetics import acting_sources
 from .meridian import Array, Meridian
 from .supports import as_support, floats, free_rotations
 
@@ -411,8 +412,7 @@ def space_of_scene(scene: Any) -> Space:
 
 def anchored(scene: Any) -> frozenset[str]:
     """In which directions something outside the membrane of a scene sees where it is: a source or load, unless it does nothing."""
-    sources = [s for s in scene.sources if getattr(s, "strength", 1.0) != 0] if scene.susceptibility else []
-    acting = [*sources, *(load for load in scene.loads if load.acts)]
+    acting = [*acting_sources(scene.sources, scene.susceptibility), *(load for load in scene.loads if load.acts)]
     return frozenset().union(*(part.sees for part in acting))
 
 

@@ -130,6 +130,11 @@ def check_source(source: Any) -> None:
         raise InputError("source.orientation", orientation, "1 or -1 is allowed")
 
 
+def acting_sources(sources: Sequence[Source], susceptibility: Any) -> tuple[Source, ...]:
+    """Those that do something: a source of no strength is none, and no source acts on a membrane without susceptibility."""
+    return tuple(s for s in sources if getattr(s, "strength", 1.0) != 0) if susceptibility else ()
+
+
 def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any, Any]:
     """Sum (h_rho, h_z, h_theta) of the fields of all sources at (rho, eta)."""
     fields = [source.field(rho, eta) for source in sources]

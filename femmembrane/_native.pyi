@@ -1,4 +1,3 @@
-from collections.abc import Sequence
 from typing import final
 
 import numpy as np
@@ -37,17 +36,9 @@ class Elements:
     def at_quadrature(self, x: Array, out: Array) -> None: ...
     def evaluate(self, x: Array, parameters: Array, gradients: Array, densities: Array) -> tuple[float, float, float]: ...
     def assemble(self, stiffness: Array, band: Array) -> None: ...
-    def correct(
-        self,
-        control: Sequence[object],
-        x: Array,
-        parameters: Array,
-        tolerance: float,
-        residual: float,
-        max_iterations: int,
-        gradients: Array,
-        densities: Array,
-    ) -> tuple[bool, float, float, float, float, int, float, float, float, Border | None]: ...
+    def largest(self, x: Array) -> tuple[float, float]: ...
+    def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]: ...
+    def border(self, stiffness: Array, volume_gradient: Array, row: Array, corner: float) -> Border: ...
 
 def inertia(
     band: Array, mass: Array | None, constraint: Array | None, size: int, half_bandwidth: int, compliance: float, shift: float

@@ -1,7 +1,7 @@
 """The compiled half, if there is one.
 
 The extension module ``femmembrane._native`` (sources in ``compiled/``) does what the package does in NumPy: point functions, assembly, band
-factors and the undamped corrector, with the same formulas and decisions. It knows no scene. It is built on installation where a C compiler
+factors and eigenvalue iterations, with the same formulas. It knows no scene, and decides nothing. It is built on installation where a C compiler
 is found; without it, or with ``FEMMEMBRANE_COMPILED=0`` in the environment, everything runs in NumPy and gives the same answers to
 round-off.
 """
@@ -17,7 +17,7 @@ from types import ModuleType
 #: environment variable that switches the compiled half off
 SWITCH = "FEMMEMBRANE_COMPILED"
 #: what the sources in ``compiled/`` answer; raised there and here when arguments or answers change
-INTERFACE = 1
+INTERFACE = 2
 
 
 def _load() -> ModuleType | None:

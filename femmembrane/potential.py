@@ -283,12 +283,19 @@ class Potential:
         (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.evaluate(x, s)
         return np.stack([R + u, Z + w])
 
-    def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
+    def largest(self, x: Array) -> tuple[float, float]:
+        """Largest sizes of a vector of unknowns among u and among w; infinite where there is no number."""
+        if (elements := self.elements) is not None:
+            return elements.largest(np.ascontiguousarray(x))
+        u, w = (float(np.abs(x[index]).max(initial=0.0)) for index in self.space.fields)
+        return u if u < np.inf else np.inf, w if w < np.inf else np.inf
+
+    def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
-        space = self.space
+        if (elements := self.elements) is not None:
+            return elements.force_scale(np.ascontiguousarray(evaluation.force_density), pressure)
         density = np.abs(evaluation.force_density).reshape(self._force_shape)
-        total = space.assemble_magnitude(density[0] + abs(pressure) * density[1])
-        return tuple(float(total[index].max(initial=0.0)) for index in space.fields)
+        return self.largest(self.space.assemble_magnitude(density[0] + abs(pressure) * density[1]))
 
     def response(self, e1: Array, e2: Array) -> Array:
         """Principal mechanical stresses and their derivatives with respect to the Hencky strains.

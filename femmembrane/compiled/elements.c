@@ -1,5 +1,5 @@
 /*
- * The elements of one space under one tape: evaluation, assembly and the bordered Newton corrector.
+ * The elements of one space under one tape: evaluation, assembly, and the factors and sizes that the bordered Newton corrector asks for.
  *
  * Everything is read off arrays: which unknown a local coefficient is, tables of shape functions, data at the quadrature points. Elements
  * are taken four at a time, one a lane, so that assembly has no short loops; points are numbered quadrature point first, element second.
@@ -10,8 +10,6 @@
 #include <string.h>
 
 #define LANES 4
-/* as in solve/newton.py */
-#define PRESSURE 1e-9
 /* points evaluated in one go: a block and the registers of the tape stay in the processor's cache */
 #define POINTS 256
 /* rows of the point function: energies and volume, two gradients, second derivatives, stresses */
@@ -208,111 +206,17 @@ static void assemble(const Elements *s, const double *density, double *band, Py_
     }
 }
 
-/* ---- the corrector -------------------------------------------------------------------------------------------------------------- */
+/* ---- for the corrector -------------------------------------------------------------------------------------------------------------- */
 
-/* N(x, P): row . (x - reference) + corner (P - held) + offset, or (a P + b) (V + c) - d */
-typedef struct {
-    int product, anywhere; /* anywhere: nobody asked for a particular value */
-    double a, b, c, d, corner, held, offset;
-    Py_buffer row, reference;
-} Control;
-
-static int control_init(Control *c, PyObject *asked, Py_ssize_t n)
+/* largest sizes of a vector of unknowns among u and among w; infinite where there is no number */
+static void largest(const Elements *s, const double *x, double *size)
 {
-    PyObject *row, *reference;
-    memset(c, 0, sizeof *c);
-    if (PyTuple_Size(asked) == 4) {
-        c->product = 1;
-        return PyArg_ParseTuple(asked, "dddd", &c->a, &c->b, &c->c, &c->d) ? 0 : -1;
-    }
-    if (!PyArg_ParseTuple(asked, "OOdddp", &row, &reference, &c->corner, &c->held, &c->offset, &c->anywhere))
-        return -1;
-    if (row != Py_None && take_array(row, &c->row, 'd', n, 0, "row") < 0)
-        return -1;
-    return reference == Py_None ? 0 : take_array(reference, &c->reference, 'd', n, 0, "reference");
-}
-
-/* gap, with the row and the corner written into the border */
-static double control_equation(const Control *c, Py_ssize_t n, const double *x, double p, double volume, const double *vg, double *row, double *corner)
-{
-    if (c->product) {
-        const double absolute = c->a * p + c->b, whole = volume + c->c;
-        for (Py_ssize_t i = 0; i < n; i++)
-            row[i] = absolute * vg[i];
-        *corner = c->a * whole;
-        return absolute * whole - c->d;
-    }
-    double gap = 0.0;
-    *corner = c->corner;
-    if (c->row.buf == NULL) {
-        memset(row, 0, sizeof(double) * n);
-    } else {
-        memcpy(row, c->row.buf, sizeof(double) * n);
-        const double *reference = c->reference.buf;
-        for (Py_ssize_t i = 0; i < n; i++)
-            gap += row[i] * (reference == NULL ? x[i] : x[i] - reference[i]);
-    }
-    return gap + c->corner * (p - c->held) + c->offset;
-}
-
-static int all_finite(const double *x, Py_ssize_t n)
-{
-    double s[4] = {0};
-    Py_ssize_t i = 0;
-    for (; i + 4 <= n; i += 4)
-        for (int l = 0; l < 4; l++)
-            s[l] += x[i + l] * 0.0;
-    for (; i < n; i++)
-        s[0] += x[i] * 0.0;
-    return s[0] + s[1] + s[2] + s[3] == 0.0;
-}
-
-/* largest change of u and of w, each relative to its own size */
-static double relative_size(const Elements *s, const double *dx, const double *x)
-{
-    double change[2] = {0}, size[2] = {0}, largest = 0.0;
+    size[0] = size[1] = 0.0;
     for (Py_ssize_t i = 0; i < s->n_free; i++) {
-        const int f = s->field[i];
-        const double a = fabs(dx[i]), b = fabs(x[i]);
-        if (!(a < HUGE_VAL))
-            return HUGE_VAL;
-        change[f] = a > change[f] ? a : change[f];
-        size[f] = b > size[f] ? b : size[f];
-    }
-    for (int f = 0; f < 2; f++)
-        if (change[f] > 0.0) {
-            const double c = change[f] / (size[f] > change[f] ? size[f] : change[f]);
-            largest = c > largest ? c : largest;
-        }
-    return largest;
-}
-
-static double relative_residual(const Elements *s, const double *residual, const double *force, double pressure)
-{
-    double scale[2], size[2] = {0}, largest = 0.0;
-    force_scale(s, force, pressure, scale);
-    for (Py_ssize_t i = 0; i < s->n_free; i++) {
-        const double a = fabs(residual[i]);
+        const double a = fabs(x[i]);
         if (!(a <= size[s->field[i]]))
-            size[s->field[i]] = a;
+            size[s->field[i]] = a < HUGE_VAL ? a : HUGE_VAL;
     }
-    for (int f = 0; f < 2; f++) {
-        const double part = scale[f] == 0.0 ? 0.0 : size[f] / scale[f];
-        if (!(part < HUGE_VAL))
-            return HUGE_VAL;
-        largest = part > largest ? part : largest;
-    }
-    return largest;
-}
-
-/* whether a correction of P changes no force */
-static int balanced(const Elements *s, double dp, const double *volume_gradient, const double *force, double pressure)
-{
-    double scale[2], largest = 0.0;
-    force_scale(s, force, pressure, scale);
-    for (Py_ssize_t i = 0; i < s->n_free; i++)
-        largest = fabs(volume_gradient[i]) > largest ? fabs(volume_gradient[i]) : largest;
-    return fabs(dp) * largest <= PRESSURE * (scale[0] > scale[1] ? scale[0] : scale[1]);
 }
 
 /* factors of K at the densities, with the column -V' and the row and corner in place; -1 without memory */
@@ -338,72 +242,6 @@ static int bordered(const Elements *s, Border *b, const double *stiffness, const
     for (Py_ssize_t i = 0; i < n; i++)
         b->column[i] = -volume_gradient[i];
     border_set(b, corner);
-    return 0;
-}
-
-typedef struct {
-    double pressure, values[3], correction, residual, gap;
-    int iterations, converged, factored;
-} Result;
-
-/* Mirror of solve/newton.py, undamped: what each line is for stands there. */
-static int correct(const Elements *s, const Control *control, double *x, double *parameters, double tolerance, double confirmed,
-                   int max_iterations, double *gradients, double *density, Border *b, double *work, Result *r)
-{
-    const Py_ssize_t n = s->n_free, np = s->n_points;
-    double *force = work, *dx = force + n, *row = dx + n, corner, previous = HUGE_VAL;
-    const double *vg = gradients + n, *stiffness = density + N_FORCE * np;
-    double p = parameters[0];
-    r->iterations = r->converged = r->factored = 0;
-    evaluate(s, x, parameters, r->values, gradients, density);
-    for (;;) {
-        for (Py_ssize_t i = 0; i < n; i++)
-            force[i] = gradients[i] - p * vg[i];
-        r->gap = control_equation(control, n, x, p, r->values[2], vg, b->row, &corner);
-        r->factored = 0;
-        if (!all_finite(force, n) || !all_finite(stiffness, N_STIFF * np)) {
-            r->correction = r->residual = HUGE_VAL;
-            break;
-        }
-        if (bordered(s, b, stiffness, vg, corner) < 0)
-            return -1;
-        r->factored = 1;
-        for (Py_ssize_t i = 0; i < n; i++)
-            force[i] = -force[i];
-        const double dp = border_solve(b, force, -r->gap, dx), size = relative_size(s, dx, x);
-        const int met = control->anywhere || fabs(r->gap) <= 1e-14 * (fabs(dot(b->row, x, n)) + fabs(corner * p));
-        const int done = size <= tolerance && (met || previous <= tolerance) && balanced(s, dp, vg, density, p);
-        const int stalled = !(size < HUGE_VAL) || (size > 0.5 * previous && size > 1e3 * tolerance);
-        if (done || stalled || r->iterations == max_iterations) {
-            r->converged = done;
-            r->correction = size;
-            r->residual = relative_residual(s, force, density, p);
-            break;
-        }
-        for (Py_ssize_t i = 0; i < n; i++)
-            x[i] += dx[i];
-        parameters[0] = p += dp;
-        evaluate(s, x, parameters, r->values, gradients, density);
-        r->iterations++;
-        const double ratio = size / previous, foretold = size * (previous == HUGE_VAL || previous == 0.0 ? (size < 1.0 ? size : 1.0) : ratio * ratio);
-        if (foretold <= tolerance / 10) {
-            for (Py_ssize_t i = 0; i < n; i++)
-                force[i] = p * vg[i] - gradients[i];
-            if (all_finite(force, n) && all_finite(stiffness, N_STIFF * np)) {
-                double unused;
-                r->gap = control_equation(control, n, x, p, r->values[2], vg, row, &unused);
-                border_solve(b, force, -r->gap, dx);
-                r->correction = relative_size(s, dx, x);
-                r->residual = relative_residual(s, force, density, p);
-                if (r->correction <= tolerance / 10 && r->residual <= confirmed) {
-                    r->converged = 1;
-                    break;
-                }
-            }
-        }
-        previous = size;
-    }
-    r->pressure = p;
     return 0;
 }
 
@@ -564,48 +402,70 @@ static PyObject *elements_assemble(PyObject *self, PyObject *args)
     Py_RETURN_NONE;
 }
 
-/*
- * correct(control, x, parameters, tolerance, residual, max_iterations, gradients, densities): x is replaced by the solution. Answers
- * (converged, pressure, elastic, magnetic, volume, iterations, correction, residual, gap, Border or None).
- */
-static PyObject *elements_correct(PyObject *self, PyObject *args)
+/* largest(x): largest sizes among u and among w */
+static PyObject *elements_largest(PyObject *self, PyObject *source)
+{
+    const Elements *s = (Elements *)self;
+    Py_buffer x = {0};
+    double size[2];
+    const int bad = take_array(source, &x, 'd', s->n_free, 0, "x") < 0;
+    if (!bad)
+        largest(s, x.buf, size);
+    PyBuffer_Release(&x);
+    return bad ? NULL : Py_BuildValue("(dd)", size[0], size[1]);
+}
+
+/* force_scale(densities, pressure): largest sums of absolute forces that meet at a node, along u and along w */
+static PyObject *elements_force_scale(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    PyObject *source;
+    Py_buffer d = {0};
+    double pressure, scale[2];
+    if (!PyArg_ParseTuple(args, "Od", &source, &pressure))
+        return NULL;
+    const int bad = take_array(source, &d, 'd', N_FORCE * s->n_points, 0, "densities") < 0;
+    if (!bad)
+        force_scale(s, d.buf, pressure, scale);
+    PyBuffer_Release(&d);
+    return bad ? NULL : Py_BuildValue("(dd)", scale[0], scale[1]);
+}
+
+/* border(stiffness, volume gradient, row, corner): factors of [K, -V'; row, corner] */
+static PyObject *elements_border(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
     const Py_ssize_t n = s->n_free;
-    PyObject *asked, *o[4], *answer = NULL;
-    Py_buffer x = {0}, p = {0}, g = {0}, d = {0};
-    Control control;
-    double tolerance, confirmed;
-    int most;
-    if (!PyArg_ParseTuple(args, "O!OOddiOO", &PyTuple_Type, &asked, &o[0], &o[1], &tolerance, &confirmed, &most, &o[2], &o[3]))
+    PyObject *o[3];
+    Py_buffer d = {0}, v = {0}, r = {0};
+    double corner;
+    if (!PyArg_ParseTuple(args, "OOOd", &o[0], &o[1], &o[2], &corner))
         return NULL;
-    const int bad = control_init(&control, asked, n) < 0 || take_array(o[0], &x, 'd', n, 1, "x") < 0 ||
-                    take_array(o[1], &p, 'd', 2, 1, "parameters") < 0 || take_array(o[2], &g, 'd', 2 * n, 1, "gradients") < 0 ||
-                    take_array(o[3], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
+    BorderObject *border = NULL;
+    const int bad = take_array(o[0], &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
+                    take_array(o[1], &v, 'd', n, 0, "volume gradient") < 0 || take_array(o[2], &r, 'd', n, 0, "row") < 0;
     if (!bad) {
-        Result r;
-        double *work = malloc(sizeof(double) * 3 * (n + 1));
-        BorderObject *border = PyObject_New(BorderObject, types.border);
-        const int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0 || work == NULL ||
-                            correct(s, &control, x.buf, p.buf, tolerance, confirmed, most, g.buf, d.buf, &border->border, work, &r) < 0;
-        free(work);
-        if (without) {
-            PyErr_NoMemory();
-        } else {
-            answer = Py_BuildValue("(NddddidddO)", PyBool_FromLong(r.converged), r.pressure, r.values[0], r.values[1], r.values[2],
-                                   r.iterations, r.correction, r.residual, r.gap, r.factored ? (PyObject *)border : Py_None);
+        border = PyObject_New(BorderObject, types.border);
+        int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0;
+        if (!without) {
+            memcpy(border->border.row, r.buf, sizeof(double) * n);
+            without = bordered(s, &border->border, d.buf, v.buf, corner) < 0;
         }
-        Py_XDECREF((PyObject *)border);
+        if (without) {
+            Py_CLEAR(border);
+            PyErr_NoMemory();
+        }
     }
-    PyBuffer_Release(&control.row), PyBuffer_Release(&control.reference);
-    PyBuffer_Release(&x), PyBuffer_Release(&p), PyBuffer_Release(&g), PyBuffer_Release(&d);
-    return answer;
+    PyBuffer_Release(&d), PyBuffer_Release(&v), PyBuffer_Release(&r);
+    return (PyObject *)border;
 }
 
 static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadrature, METH_VARARGS, NULL},
                                          {"evaluate", elements_evaluate, METH_VARARGS, NULL},
                                          {"assemble", elements_assemble, METH_VARARGS, NULL},
-                                         {"correct", elements_correct, METH_VARARGS, NULL},
+                                         {"largest", elements_largest, METH_O, NULL},
+                                         {"force_scale", elements_force_scale, METH_VARARGS, NULL},
+                                         {"border", elements_border, METH_VARARGS, NULL},
                                          {NULL, NULL, 0, NULL}};
 static PyType_Slot elements_slots[] = {
     {Py_tp_new, elements_new}, {Py_tp_dealloc, elements_dealloc}, {Py_tp_methods, elements_methods}, {0, NULL}};

@@ -17,19 +17,12 @@ from ..discretization.space import Space
 from ..errors import InputError
 from ..potential import Array, Evaluation
 
-#: a control in numbers: (row, reference, corner, held, offset, anywhere) for row . (x - reference) + corner (P - held) + offset, where
-#: None stands for zeros and anywhere says that nobody asked for a particular value; or (a, b, c, d) for (a P + b) (V + c) - d
-Numbers = tuple[Array | None, Array | None, float, float, float, bool] | tuple[float, float, float, float]
-
 
 class Control(Protocol):
     """One scalar equation N(x, P) = 0 beside equilibrium, written as (what is held) - (its value)."""
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         """N, dN/dx (shape (n_free,)) and dN/dP."""
-
-    def numbers(self, space: Space) -> Numbers:
-        """The same equation for the compiled corrector."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +34,6 @@ class VolumeControl:
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         return evaluation.volume - self.volume, evaluation.volume_gradient, 0.0
 
-    def numbers(self, space: Space) -> Numbers:
-        return 0.0, 1.0, 0.0, self.volume
-
 
 @dataclass(frozen=True)
 class PressureControl:
@@ -54,9 +44,6 @@ class PressureControl:
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         return pressure - self.pressure, np.zeros_like(x), 1.0
 
-    def numbers(self, space: Space) -> Numbers:
-        return None, None, 1.0, self.pressure, 0.0, False
-
 
 @dataclass(frozen=True)
 class CenterHeightControl:
@@ -66,9 +53,6 @@ class CenterHeightControl:
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         return space.center_height(x) - self.height, self._row(space), 0.0
-
-    def numbers(self, space: Space) -> Numbers:
-        return self._row(space), None, 0.0, 0.0, space.first_height - self.height, False
 
     def _row(self, space: Space) -> Array:
         row = np.zeros(space.n_free)
@@ -125,9 +109,6 @@ class Gas:
         absolute, total = pressure + self.atmosphere, evaluation.volume + self.chamber
         return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
 
-    def numbers(self, space: Space) -> Numbers:
-        return 1.0, self.atmosphere, self.chamber, self.amount
-
 
 @dataclass(frozen=True, eq=False)
 class ArcLengthControl:
@@ -141,6 +122,3 @@ class ArcLengthControl:
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         value = self.dual @ (x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
         return float(value), self.dual, self.dual_pressure
-
-    def numbers(self, space: Space) -> Numbers:
-        return self.dual, np.ascontiguousarray(self.prediction), self.dual_pressure, self.predicted_pressure, 0.0, True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,13 +11,12 @@ from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, BorderedFactor, CompiledBorder
 from .controls import ArcLengthControl, Control
 
-if TYPE_CHECKING:
-    from .._native import Elements
-
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
+#: a component of the displacement that is this small beside the other may be round-off of a zero
+NEGLIGIBLE = 1e-12
 #: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
 PRESSURE = 1e-9
 
@@ -72,9 +70,6 @@ def correct(
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
         foretold from two corrections in quadratic convergence and confirmed by the residual at x and its correction by the factors before.
     """
-    elements = None if damped else potential.elements
-    if elements is not None:
-        return _compiled(elements, potential, control, x, pressure, magnetic, tolerance, max_iterations)
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration = np.inf, 0
     while True:
@@ -82,11 +77,11 @@ def correct(
         if not equations.finite:
             return NewtonResult(x, pressure, evaluation, None, iteration, np.inf, np.inf, equations.gap, Status.NOT_CONVERGED)
         dx, dp = equations.newton_step()
-        size = relative_size(potential, dx, x)
+        size = equations.size(dx)
         close, previously_close = size <= tolerance, previous <= tolerance
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         done = done and equations.balanced(dp)
-        stalled = not np.isfinite(size) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
+        stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
@@ -98,34 +93,11 @@ def correct(
         foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
-            if last.finite and (left := relative_size(potential, last.newton_step()[0], x)) <= tolerance / 10:
+            if last.finite and (left := last.size(last.newton_step()[0])) <= tolerance / 10:
                 result = last.result(iteration, left, Status.CONVERGED)
                 if result.residual <= RESIDUAL:
                     return result
         previous = size
-
-
-def _compiled(
-    elements: Elements,
-    potential: Potential,
-    control: Control,
-    x: Array,
-    pressure: float,
-    magnetic: float,
-    tolerance: float,
-    max_iterations: int,
-) -> NewtonResult:
-    """:func:`correct`, undamped, in the compiled half."""
-    gradients, densities = potential.results()
-    x, parameters = x.copy(), np.array([pressure, magnetic], dtype=float)
-    numbers = control.numbers(potential.space)
-    converged, pressure, elastic, field_energy, volume, iterations, correction, residual, gap, border = elements.correct(
-        numbers, x, parameters, tolerance, RESIDUAL, max_iterations, gradients, densities
-    )
-    evaluation = potential.evaluation(x, (elastic, field_energy, volume), gradients, densities, magnetic)
-    bordered = None if border is None else CompiledBorder(border)
-    status = Status.CONVERGED if converged else Status.NOT_CONVERGED
-    return NewtonResult(x, pressure, evaluation, bordered, iterations, correction, residual, gap, status)
 
 
 class Equations:
@@ -142,10 +114,10 @@ class Equations:
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
-        self.gap, row, corner = control.equation(potential.space, x, pressure, evaluation)
+        self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.stiffness_density).all())
         if bordered is None and self.finite:
-            bordered = BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
+            bordered = bordered_factor(evaluation, self._row, self._corner)
         self.bordered = bordered
 
     @property
@@ -153,16 +125,29 @@ class Equations:
         """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
         if isinstance(self.control, ArcLengthControl):
             return True
-        _, row, corner = self.control.equation(self.potential.space, self.x, self.pressure, self.evaluation)
-        return bool(abs(self.gap) <= 1e-14 * (abs(row @ self.x) + abs(corner * self.pressure)))
+        return bool(abs(self.gap) <= 1e-14 * (abs(self._row @ self.x) + abs(self._corner * self.pressure)))
 
     def balanced(self, dp: float) -> bool:
         """Whether a correction of P changes no force."""
         scale = max(self.potential.force_scale(self.evaluation, self.pressure))
-        return bool(abs(dp) * np.abs(self.evaluation.volume_gradient).max(initial=0.0) <= PRESSURE * scale)
+        return bool(abs(dp) * max(self.potential.largest(self.evaluation.volume_gradient)) <= PRESSURE * scale)
 
     def newton_step(self) -> tuple[Array, float]:
         return self._factored.solve(-self.force, -self.gap)
+
+    def size(self, dx: Array) -> float:
+        """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""
+        change, size = self.potential.largest(dx), self.potential.largest(self.x)
+        parts = [c / max(s, c) if c else 0.0 for c, s in zip(change, size, strict=True)]
+        if max(change) < np.inf and max(parts) > TOLERANCE:
+            small = NEGLIGIBLE * max(*size, *change)
+            if any(c and max(c, s) <= small for c, s in zip(change, size, strict=True)):
+                residual = relative_residuals(self.potential, self.force, self.evaluation, self.pressure)
+                parts = [
+                    0.0 if max(c, s) <= small and r <= RESIDUAL else part
+                    for c, s, r, part in zip(change, size, residual, parts, strict=True)
+                ]
+        return max(parts) if max(change) < np.inf else np.inf
 
     def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
         residual = relative_residual(self.potential, self.force, self.evaluation, self.pressure)
@@ -177,6 +162,14 @@ class Equations:
     def simplified_step(self, force: Array, gap: float) -> Array:
         """The correction that the factors here give for residuals elsewhere."""
         return self._factored.solve(-force, -gap)[0]
+
+
+def bordered_factor(evaluation: Evaluation, row: Array, corner: float) -> BorderedFactor | CompiledBorder:
+    """Factors of K at a state with the column -V' and the row of a control."""
+    elements = evaluation.potential.elements
+    if elements is None:
+        return BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
+    return CompiledBorder(elements.border(evaluation.stiffness_density, evaluation.volume_gradient, row, corner))
 
 
 def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
@@ -196,22 +189,21 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
 
 def relative_size(potential: Potential, dx: Array, x: Array) -> float:
     """Largest change of u and of w, each relative to its own size: on a nearly flat membrane u is of order w^2."""
-    change, size = np.abs(dx), np.abs(x)
-    largest = 0.0
-    for index in potential.space.fields:
-        c = float(change[index].max(initial=0.0))  # NaN propagates
-        if not c < np.inf:
-            return np.inf
-        if c > 0:
-            largest = max(largest, c / max(float(size[index].max()), c))
-    return largest
+    change, size = potential.largest(dx), potential.largest(x)
+    if not max(change) < np.inf:
+        return np.inf
+    return max(c / max(s, c) if c else 0.0 for c, s in zip(change, size, strict=True))
+
+
+def relative_residuals(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
+    """Out-of-balance forces along u and along w over the forces that meet at a node."""
+    scales = potential.force_scale(evaluation, pressure)
+    # where no force acts along one of them, what is there is round-off of the other
+    least = np.finfo(float).eps * max(scales)
+    return tuple(size / max(s, least) if size else 0.0 for size, s in zip(potential.largest(residual), scales, strict=True))
 
 
 def relative_residual(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> float:
-    """Out-of-balance force over the forces that meet at a node, the larger of the two components."""
-    scales = potential.force_scale(evaluation, pressure)
-    parts = [
-        0.0 if s == 0 else float(np.abs(residual[index]).max(initial=0.0)) / s
-        for index, s in zip(potential.space.fields, scales, strict=True)
-    ]
-    return max(parts) if all(np.isfinite(parts)) else np.inf
+    """The larger of :func:`relative_residuals`; infinite where it is no number."""
+    worst = max(relative_residuals(potential, residual, evaluation, pressure))
+    return worst if worst < np.inf else np.inf

@@ -41,8 +41,8 @@ class Status(StrEnum):
 _ADVICE = {
     Status.CONVERGED: "residual and constraint were recomputed and are at round-off",
     Status.NOT_CONVERGED: "start nearer (smaller load steps, or start= an equilibrium close by)",
-    Status.STEP_UNDERFLOW: "the branch turns or ends here; follow it by arc length (fm.trace) to see which",
-    Status.NO_EQUILIBRIUM: "no equilibrium was found near this load; the branch turned back before reaching it",
+    Status.STEP_UNDERFLOW: "no step beyond this point converges; where the branch turns back in the load, fm.trace follows it round",
+    Status.NO_EQUILIBRIUM: "start from a neighbour (start= an equilibrium close by), or follow a branch by arc length (fm.trace) to see which loads it passes",
     Status.DIPOLE_CONTACT: "the membrane runs into a source, where the energy has no lower bound; lower the strength or the load",
     Status.NOT_A_MINIMUM: 'forces balance there, but a minimiser cannot hold it; solver="newton" accepts such states',
     Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",

@@ -11,7 +11,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.potential import Potential, potential_of, vectorise
 from femmembrane.solve.minimize import nlp_functions
-from femmembrane.solve.start import spherical_dome
+from femmembrane.solve.guess import spherical_dome
 
 from .cases import OGDEN, disc_scene
 

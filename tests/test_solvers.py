@@ -10,7 +10,7 @@ from femmembrane.potential import potential_of
 from femmembrane.solve.controls import CenterHeightControl, PressureControl, VolumeControl
 from femmembrane.solve.minimize import is_minimum, minimize_and_verify
 from femmembrane.solve.newton import correct
-from femmembrane.solve.start import spherical_dome
+from femmembrane.solve.guess import spherical_dome
 
 from .cases import CONTROLS, OGDEN, POINTS, PROBLEMS, SOLVERS, disc_scene
 

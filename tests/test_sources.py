@@ -17,7 +17,7 @@ from femmembrane.potential import Family, Potential, _casadi_answers_numpy, pote
 from femmembrane.solve.controls import PressureControl
 from femmembrane.solve.newton import correct
 from femmembrane.solve.parameter import Parameter, names
-from femmembrane.solve.start import spherical_dome
+from femmembrane.solve.guess import spherical_dome
 from femmembrane.stability.azimuthal import azimuthal_operator
 from femmembrane.stability.profile import profile_at
 from femmembrane.views import plots

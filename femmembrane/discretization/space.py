@@ -44,9 +44,9 @@ class Space:
     degree : int
     quadrature : int, optional
         Polynomial degree integrated exactly; default 2 degree + 1.
-    anchored : frozenset of {"along", "across"}
-        Where something outside, such as a magnetic source, sees where the membrane is: motions along the axis, and across it, are then
-        not rigid, and nothing is pinned for them.
+    anchored : frozenset of {"along", "shift", "tilt"}
+        Rigid motions that something outside, such as a magnetic source, sees: along the axis, across it, and about a diameter. They are
+        not free, and nothing is pinned for them.
 
     Attributes
     ----------
@@ -86,6 +86,9 @@ class Space:
         Whether the parameter of the meridian is its radius.
     lengths : ndarray, shape (n_elements,)
         Arc length of each element at rest.
+    unit : float
+        Length by which everything of this membrane is measured, so that no answer hangs on the unit of its lengths: its largest radius,
+        or its arc length where that is smaller, of a closed curve its arc length over 2 pi. It is 1 for a disc, a sphere, and a torus.
     weights : ndarray, shape (n_quadrature, n_elements)
         2 pi times the quadrature weight on the reference element.
     """
@@ -107,7 +110,9 @@ class Space:
         self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
+        span = float(self.lengths.sum()) / (1 if mesh.supports() else 2 * np.pi)
         self._support(n_nodes)
+        self.unit = min(float(mesh.position(self.ends)[0].max()), span)
         self._number(self.nodes[local])
         self._tabulate(points)
 
@@ -126,8 +131,8 @@ class Space:
         in_plane = [pole or ("w" in end.held and height == 0) for pole, end, height in zip(on_axis, self.supports, Z, strict=False)]
         self.loose = adrift and "along" in self.anchored
         self.lids = adrift or not all(in_plane)
-        across = "across" in self.anchored
-        self.rotations = (False, False) if across else free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
+        shift, tilt = free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
+        self.rotations = (shift and "shift" not in self.anchored, tilt and "tilt" not in self.anchored)
         radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
         if not radius.max() > 0:
             raise InputError("mesh.elements", self.n_elements, "a meridian from pole to pole needs 2 or more elements")
@@ -139,6 +144,11 @@ class Space:
         walls = [R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)]
         self.wall = self.between(walls) if any(walls) else None
         self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
+
+    @property
+    def units(self) -> dict[str, float]:
+        """What pressures, volumes and heights of this membrane are measured by, in those of R0."""
+        return {"pressure": 1 / self.unit, "volume": self.unit**3, "center_height": self.unit}
 
     def between(self, at_ends: list[float]) -> tuple[Array, Array]:
         """A linear function of the meridian and its slope along the reference element, from values at its ends."""

@@ -53,8 +53,9 @@ def hub_density(forces: tuple[Any, Any], hub: Any, hub_s: Any, z: Any, z_s: Any)
 class Load:
     """A load besides the pressure: no load at all, unless a method says otherwise."""
 
-    #: motions of the membrane as a whole, "along" the axis and "across" it, on which it works
-    sees: frozenset[str] = frozenset({"along", "across"})
+    #: motions of the membrane as a whole on which it works, alone or beside the pressure: "along" the axis, a "shift" across it, and a
+    #: "tilt" about a diameter; what pulls down pulls alike wherever the membrane is shifted to
+    sees: frozenset[str] = frozenset({"along", "tilt"})
 
     @property
     def acts(self) -> bool:

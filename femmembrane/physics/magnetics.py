@@ -31,8 +31,9 @@ class Source:
 
     #: (radius, height) of circles around the axis on which the field is singular
     circles: tuple[tuple[float, float], ...] = ()
-    #: motions of the membrane as a whole, "along" the axis and "across" it, that change the intensity, alone or beside another source
-    sees: frozenset[str] = frozenset({"along", "across"})
+    #: motions of the membrane as a whole that change the intensity, alone or beside another source: "along" the axis, a "shift" across it,
+    #: and a "tilt" about a diameter
+    sees: frozenset[str] = frozenset({"along", "shift", "tilt"})
     #: argument and advice for a field that is not finite on the undeformed membrane
     refusal = ("height", "the source lies on the membrane, where its field is singular; move it off")
 

@@ -146,7 +146,7 @@ class Wire(Source):
     strength: float
     orientation: int = 1
 
-    sees = frozenset({"across"})
+    sees = frozenset({"shift", "tilt"})
     refusal = (
         "kind",
         "the wire runs along the axis, where its field is singular, and pierces the pole; a membrane without a pole is allowed",

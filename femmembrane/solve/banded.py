@@ -79,6 +79,30 @@ class BorderedFactor:
         return rest - second * self._w, float(first + second)
 
 
+class WideBorder:
+    """Solver for K with k borders, [K, B; C^T, D], through [K, b; b^T, 0]: regular wherever the whole matrix is, however singular K.
+
+    With x = K_b^-1-part of (f - B y, t), t = b.x is one more unknown and the multiplier of b must vanish: k + 1 dense equations.
+    """
+
+    def __init__(self, deflated: BorderedFactor, columns: list[Array], rows: list[Array], corner: Array) -> None:
+        zero = np.zeros_like(columns[0])
+        self._deflated, self._rows = deflated, np.stack(rows)
+        null, gap = deflated.solve(zero, 1.0)
+        solved = [deflated.solve(-column, 0.0) for column in columns]
+        self._basis = np.stack([null, *(s[0] for s in solved)], axis=1)
+        self._matrix = np.empty((len(rows) + 1, len(columns) + 1))
+        self._matrix[0] = [gap, *(s[1] for s in solved)]
+        self._matrix[1:] = self._rows @ self._basis
+        self._matrix[1:, 1:] += corner
+
+    def solve(self, f: Array | None, h: list[float]) -> tuple[Array, Array]:
+        """(x, y) for the right-hand side (f, h); None stands for f = 0."""
+        first, slack = (np.zeros(len(self._basis)), 0.0) if f is None else self._deflated.solve(f, 0.0)
+        small = np.linalg.solve(self._matrix, np.concatenate([[-slack], h - self._rows @ first]))
+        return first + self._basis @ small, small[1:]
+
+
 class CompiledBorder:
     """:class:`BorderedFactor` of the compiled corrector."""
 

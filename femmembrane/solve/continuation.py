@@ -1,7 +1,7 @@
 """Pseudo-arc-length continuation: whole branches, stable or not, through limit points and folds.
 
 Arc length is measured in the mesh-independent inner product of :func:`.state.inner` (mean square displacement over the reference area plus
-squared pressure), so that a step means the same on every mesh.
+squared pressure, both in units of the membrane's own size), so that a step means the same on every mesh and in every unit of length.
 """
 
 from __future__ import annotations
@@ -18,6 +18,10 @@ from .banded import BorderedFactor, band_product
 from .controls import ArcLengthControl
 from .newton import correct
 from .state import Path, State, inner
+
+
+#: smallest step relative to the arc length so far
+ROUND_OFF = 1e-14
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ class BranchPoint:
     tangent: Array
     tangent_pressure: float
     dual: Array
+    dual_pressure: float
 
     def rate(self, quantity: str, potential: Potential) -> float:
         """Derivative of volume, pressure or center_height with respect to arc length: zero at a fold in that quantity."""
@@ -96,7 +101,7 @@ def trace_points(potential: Potential, point: BranchPoint, tracer: Tracer) -> It
             if new is not None:
                 break
             tracer.step /= 2
-            if tracer.step < control.smallest:
+            if tracer.step < max(control.smallest, ROUND_OFF * abs(point.sigma)):  # no shorter one could be told from none
                 raise SolveError(
                     f"no step longer than {control.smallest:g} converges from V = {point.state.volume:.9g}, P = {point.state.pressure:.9g}",
                     status=Status.STEP_UNDERFLOW,
@@ -112,7 +117,7 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     """One step of the current length: the new point or None, iterations, and the factor for the next step."""
     control, step = tracer.control, tracer.step
     x, p = tracer.path.predict(point.sigma + step)
-    result = correct(potential, ArcLengthControl(point.dual, point.tangent_pressure, x, p), x, p)
+    result = correct(potential, ArcLengthControl(point.dual, point.dual_pressure, x, p), x, p)
     if result.status is not Status.CONVERGED:
         return None, result.iterations, 0.5
     miss = math.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
@@ -123,7 +128,7 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     new = _normalised(potential, state, point.sigma, *result.bordered.solve(np.zeros_like(state.x), 1.0)) if result.bordered else None
     if new is None:
         return None, result.iterations, 0.5
-    cosine = float(point.dual @ new.tangent + point.tangent_pressure * new.tangent_pressure)
+    cosine = float(point.dual @ new.tangent + point.dual_pressure * new.tangent_pressure)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     if angle > 2 * control.turn or miss > 50 * control.deviation:
         return None, result.iterations, 0.5
@@ -136,25 +141,28 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
 
 def oriented_point(potential: Potential, state: State, sigma: float, tangent: Array, tangent_pressure: float) -> BranchPoint:
     """The point of a state whose unit tangent is known."""
-    return BranchPoint(state, sigma, tangent, tangent_pressure, _dual(potential, tangent))
+    return BranchPoint(state, sigma, tangent, tangent_pressure, *_dual(potential, tangent, tangent_pressure))
 
 
 def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> BranchPoint:
     """Unit tangent at a state, oriented like that of a neighbouring point."""
-    bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, neighbour.dual, neighbour.tangent_pressure)
+    bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, neighbour.dual, neighbour.dual_pressure)
     tangent, tp = bordered.solve(np.zeros_like(state.x), 1.0)
     return _normalised(potential, state, neighbour.sigma, tangent, tp)
 
 
 def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
-    size = math.sqrt(tangent @ _dual(potential, tangent) + tp * tp)
+    dual, dual_pressure = _dual(potential, tangent, tp)
+    size = math.sqrt(tangent @ dual + tp * dual_pressure)
     # not the dual over the size, which differs in the last bit: a resumed trace knows the unit tangent alone
     return oriented_point(potential, state, sigma, tangent / size, tp / size)
 
 
-def _dual(potential: Potential, tangent: Array) -> Array:
-    """What is multiplied with a displacement in the inner product of :func:`.state.inner` with a tangent."""
-    return band_product(potential.mass, potential.space.half_bandwidth, tangent) / potential.area
+def _dual(potential: Potential, tangent: Array, tangent_pressure: float) -> tuple[Array, float]:
+    """What is multiplied with (x, P) in the inner product of :func:`.state.inner` with a tangent."""
+    square = potential.space.unit**2
+    weighed = band_product(potential.mass, potential.space.half_bandwidth, tangent)
+    return weighed / (potential.area * square), tangent_pressure * square
 
 
 def _square(potential: Potential, dx: Array, dp: float) -> float:

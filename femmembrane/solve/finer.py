@@ -55,8 +55,8 @@ def solved_past_folds(onto: Potential, control: Control, potential: Potential, s
     """
     point = first_point(potential, state, 1)
     start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
-    dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / onto.area
-    across = ArcLengthControl(dual, point.tangent_pressure, start, state.pressure)
+    dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / (onto.area * onto.space.unit**2)
+    across = ArcLengthControl(dual, point.dual_pressure, start, state.pressure)
     met = correct(onto, across, start, state.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
     if met.status is not Status.CONVERGED:
         return met

@@ -27,7 +27,7 @@ from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Family, FoldDerivatives
-from .banded import BandFactor, BorderedFactor, band_product
+from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .continuation import StepControl
 from .newton import TOLERANCE, relative_residual, relative_size
 from .state import Path, hermite
@@ -53,12 +53,12 @@ class FoldSystem:
 
     def dual(self, z: Array) -> Array:
         """The inner product with z as a row."""
-        return np.concatenate([self.weigh(z[:-2]), [z[-2], z[-1] / self.scale**2]])
+        return np.concatenate([self.weigh(z[:-2]), [z[-2] * self.family.space.unit**2, z[-1] / self.scale**2]])
 
     def weigh(self, x: Array) -> Array:
-        """Mass of the reference area times a displacement, over the area."""
+        """Mass of the reference area times a displacement, over the area and the square of the membrane's own size."""
         family = self.family
-        return band_product(family.mass, family.space.half_bandwidth, x) / family.area
+        return band_product(family.mass, family.space.half_bandwidth, x) / (family.area * family.space.unit**2)
 
     def norm(self, z: Array) -> float:
         return float(np.sqrt(max(self.inner(z, z), 0.0)))
@@ -104,30 +104,6 @@ class FoldPoint:
     def number_rate(self) -> float:
         """dm/dsigma: zero where the curve turns."""
         return float(self.tangent[-1])
-
-
-class WideBorder:
-    """Solver for K with k borders, [K, B; C^T, D], through [K, b; b^T, 0]: regular wherever the whole matrix is, however singular K.
-
-    With x = K_b^-1-part of (f - B y, t), t = b.x is one more unknown and the multiplier of b must vanish: k + 1 dense equations.
-    """
-
-    def __init__(self, deflated: BorderedFactor, columns: list[Array], rows: list[Array], corner: Array) -> None:
-        zero = np.zeros_like(columns[0])
-        self._deflated, self._rows = deflated, np.stack(rows)
-        null, gap = deflated.solve(zero, 1.0)
-        solved = [deflated.solve(-column, 0.0) for column in columns]
-        self._basis = np.stack([null, *(s[0] for s in solved)], axis=1)
-        self._matrix = np.empty((len(rows) + 1, len(columns) + 1))
-        self._matrix[0] = [gap, *(s[1] for s in solved)]
-        self._matrix[1:] = self._rows @ self._basis
-        self._matrix[1:, 1:] += corner
-
-    def solve(self, f: Array | None, h: list[float]) -> tuple[Array, Array]:
-        """(x, y) for the right-hand side (f, h); None stands for f = 0."""
-        first, slack = (np.zeros(len(self._basis)), 0.0) if f is None else self._deflated.solve(f, 0.0)
-        small = np.linalg.solve(self._matrix, np.concatenate([[-slack], h - self._rows @ first]))
-        return first + self._basis @ small, small[1:]
 
 
 class _Equations:
@@ -190,7 +166,7 @@ def _correct(system: FoldSystem, z: Array, borders: Borders, row: Array, *, turn
             dx, rest = jacobian.solve(-equations.force, [-equations.g, -float(row @ (z - guess))])
         except np.linalg.LinAlgError:
             return None
-        size = max(relative_size(system.family, dx, z[:-2]), abs(rest[0]) / (1 + abs(z[-2])), abs(rest[1]) / max(system.scale, abs(z[-1])))
+        size = max(relative_size(system.family, dx, z[:-2]), abs(rest[0]) / (system.family.space.units["pressure"] + abs(z[-2])), abs(rest[1]) / max(system.scale, abs(z[-1])))
         if size <= TOLERANCE:
             tangent, dual = _tangent(system, jacobian, row if turn_from is None else turn_from)
             residual = relative_residual(system.family, equations.force, equations.evaluation, float(z[-2]))

@@ -14,17 +14,18 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment
-from .start import START_VOLUME, guess_at_volume, moderate, start_at_volume
+from .guess import guess_at_volume
+from .start import moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
 from .wellposed import ill_posed, is_slack
 
-#: volumes of the domes from which branches and deflated iterations set out; from other shapes than flat ones: beyond that at rest, in
-#: proportion to that of a moderately inflated membrane
-STARTS = (0.5, -0.5, 5.0, -5.0, 50.0, -50.0)
+#: volumes from which branches and deflated iterations set out: beyond that at rest, in units of what a moderately inflated membrane holds
+#: more than at rest
+STARTS = (1.0, -1.0, 10.0, -10.0, 100.0, -100.0)
 #: two states closer than this are the same, relative to the size of the displacement
 SAME = 1e-6
-#: volume beyond which a branch is no longer followed
-FAR = 1e4
+#: a branch is no longer followed beyond this many times what a moderately inflated membrane holds more than at rest
+FAR = 2e4
 
 CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl}
 
@@ -47,7 +48,7 @@ class Search:
     @property
     def starts(self) -> list[float]:
         """Volumes of the starts."""
-        return [self.potential.space.reference_volume + v * moderate(self.potential) / START_VOLUME for v in STARTS]
+        return [self.potential.space.reference_volume + v * moderate(self.potential) for v in STARTS]
 
     def run(self) -> None:
         """Trace the branches through the starts, then deflate until nothing new appears."""
@@ -73,13 +74,13 @@ class Search:
                 with suppress(SolveError):  # through the flat unloaded state there is no path
                     for point in segment.crossings(self.quantity, self.load):
                         self._add(point.state)
-                if abs(volumes[-1]) > FAR:
+                if abs(volumes[-1]) > FAR * moderate(self.potential):
                     break
         self.traced.append((min(volumes), max(volumes)))
 
     def _on_traced_branch(self, state: State) -> bool:
         """Whether a state lies between two traced points of nearly the same shape: a start on a known branch is not traced again."""
-        near = [p for p in self._points if abs(p.state.volume - state.volume) < 0.5 * (1 + abs(state.volume))]
+        near = [p for p in self._points if abs(p.state.volume - state.volume) < 0.5 * (self.potential.space.units["volume"] + abs(state.volume))]
         scale = distance(self.potential, state.x, np.zeros_like(state.x))
         for p in near:
             result = correct(self.potential, VolumeControl(state.volume), p.state.x, p.state.pressure)
@@ -159,12 +160,13 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
 class Limit:
     """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one.
 
-    ``ill_posed`` is the state at which the branch became so, slack or compressed, before either was met: what follows is the mesh's.
+    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became so, slack or compressed, before either was met: what follows is the mesh's.
     """
 
     fold: Located | None
     landing: State | None
     ill_posed: State | None = None
+    last: State | None = None
 
 
 def beyond_limit(
@@ -197,15 +199,17 @@ def beyond_limit(
         start = first_point(potential, state, -1)
     kind = next(k for k, q in FOLDS.items() if q == quantity)
     fold: Located | None = None
+    last = state
     for segment in follow(potential, start, max_steps):
         if ill_posed(potential, segment.b.state.evaluation) is not None:
-            return Limit(fold, None, segment.b.state)
+            return Limit(fold, None, segment.b.state, last)
+        last = segment.b.state
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
         for met in segment.crossings(quantity, load):
             before = fold is None or met.sigma < fold.point.sigma
             if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
-                return Limit(None if before else fold, met.state)
-        if abs(segment.b.state.volume) > FAR:
+                return Limit(None if before else fold, met.state, last=met.state)
+        if abs(segment.b.state.volume) > FAR * moderate(potential):
             break
-    return Limit(fold, None)
+    return Limit(fold, None, last=last)

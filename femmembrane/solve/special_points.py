@@ -32,13 +32,14 @@ _CONTROLS: dict[str, Callable[[float], Control]] = {
 _EXACT = 1e-13
 #: the least that does: next to a crossing of branches no correction falls below round-off over the distance to it
 _AT_CROSSING = 1e-7
-#: a fold that lies this close to a value, relative to 1 + its size, lies on it
+#: a fold that lies this close to a value, relative to its size and one unit, lies on it
 ON_FOLD = 1e-13
 
 
 @dataclass(slots=True)
 class Located:
-    """A special point with the estimated error of its position, relative to (1 + size) of volume, pressure and pole height."""
+    """A special point with the estimated error of its position, relative to the size of volume, pressure and pole height and one unit of
+    each (:attr:`.Space.units`)."""
 
     kind: str
     point: BranchPoint
@@ -68,7 +69,7 @@ class Segment:
         slopes = [np.append(p.tangent, p.tangent_pressure) * self.length for p in (self.a, self.b)]
         z = hermite(ends[0], slopes[0], ends[1], slopes[1], share)
         dual = (1 - share) * self.a.dual + share * self.b.dual
-        dual_pressure = (1 - share) * self.a.tangent_pressure + share * self.b.tangent_pressure
+        dual_pressure = (1 - share) * self.a.dual_pressure + share * self.b.dual_pressure
         control = ArcLengthControl(dual, dual_pressure, z[:-1], float(z[-1]))
         # as good as round-off lets it be: the pressure of a fold is the last digit that tells its two sides apart
         for tolerance in (_EXACT, TOLERANCE, _AT_CROSSING):
@@ -131,7 +132,8 @@ class Segment:
         near = self.at(share + h if share + h < high else share - h)
         slope = (function(near) - function(point)) / (near.sigma - point.sigma)
         offset = abs(function(point) / slope) + point.state.correction
-        moved = max(abs(point.rate(q, self.potential)) * offset / (1 + abs(self.value(q, point))) for q in FOLDS.values())
+        units = self.potential.space.units
+        moved = max(abs(point.rate(q, self.potential)) * offset / (units[q] + abs(self.value(q, point))) for q in FOLDS.values())
         return share, Located(kind, point, float(moved + point.state.correction))
 
     def crossings(self, quantity: str, value: float) -> list[BranchPoint]:
@@ -142,7 +144,7 @@ class Segment:
         kind = next(k for k, q in FOLDS.items() if q == quantity)
         shares = [0.0, *(share for share, _ in self._folds_at(kind)), 1.0]
         ends = [self.value(quantity, self.at(s)) - value for s in shares]
-        ends = [ends[0], *(0.0 if abs(e) <= ON_FOLD * (1 + abs(value)) else e for e in ends[1:-1]), ends[-1]]
+        ends = [ends[0], *(0.0 if abs(e) <= ON_FOLD * (self.potential.space.units[quantity] + abs(value)) else e for e in ends[1:-1]), ends[-1]]
         return [
             self.at(high) if b == 0 and high != 1.0 else self._crossing(quantity, value, low, high)
             for low, high, a, b in zip(shares, shares[1:], ends, ends[1:], strict=False)
@@ -195,7 +197,7 @@ def _bordered_sign(point: BranchPoint) -> int:
     """Sign of det [K, -V'; tangent^T, tangent_P] = det K (tangent_P + tangent^T K^-1 V')."""
     evaluation = point.state.evaluation
     solved = point.state.factor.solve(evaluation.volume_gradient)
-    return parity(point) * (1 if point.tangent_pressure + point.dual @ solved > 0 else -1)
+    return parity(point) * (1 if point.dual_pressure + point.dual @ solved > 0 else -1)
 
 
 def parity(point: BranchPoint) -> int:

@@ -1,186 +1,245 @@
-"""Cold starts: an equilibrium at a volume without a neighbour to start from.
+"""Cold starts: an equilibrium at a load without a neighbour to start from.
 
-The order of loading is fixed, so that the answer is one state and not an accident of the optimiser: the membrane is inflated without
-its sources and loads first, then their energy is turned on at constant volume. A membrane has no bending stiffness, so that at rest nothing
-holds its shape: it is inflated at once, from a guess that encloses the volume, a dome over a disc, the reference shape shifted along its
-normal else.
+One way for every shape, support, material, source, load and control. Its parts are three, each with bounded work:
+
+1. *A bare membrane at a volume*, without sources and loads, which at rest nothing holds: a guess that encloses the volume, solved by
+   Newton's method, by going downhill, or held in its place by dead forces that fade out (:mod:`.homotopy`), whichever arrives first.
+2. *Sources and loads turned on* there, at constant volume, along the path even where it turns back.
+3. *The branch through that state* to the load that is asked for, by arc length in both directions.
+
+The order of loading is fixed, so that the answer is one state and not an accident of the optimiser. Where a part does not arrive, the next
+starting volume is tried, from near the load outwards, then the mirror side, then the guess with all sources and loads at once. An error
+says what was tried; that there is no equilibrium it never claims.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import numpy as np
 
-from ..discretization.meridian import Disc
-from ..discretization.space import Space
 from ..errors import SolveError, Status
-from ..potential import Array, Potential, potential_of
+from ..potential import Potential, potential_of
 from .banded import negative_directions
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
-from .controls import CenterHeightControl, VolumeControl
+from .controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from .finer import transferred
+from .guess import guess_at_volume
+from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
 from .newton import correct
 from .special_points import Segment
-from .state import Path, State, at_rest, flat_state
+from .state import Path, State, at_rest, flat_state, inner
 from .stepping import march
-from .wellposed import ill_posed, is_slack
+from .wellposed import is_slack, slackness, unresolved_source
 
-#: a moderately inflated membrane holds this much more than at rest, or that part of it. Below, one with sources is reached from there:
-#: turning sources on at the flat state starts from a singular Hessian
+#: a moderately inflated membrane holds this much more than at rest, in units of its own size, or that part of it. Below, one with sources
+#: is reached from there: turning sources on at the flat state starts from a singular Hessian
 START_VOLUME, START_SHARE = 0.5, 0.12
-#: volume below which an equilibrium is looked for from the nearly flat side
+#: volume, in units of the membrane's own size, below which an equilibrium is looked for from the nearly flat side
 NEARLY_FLAT = 0.05
-#: distance to a source, over R0, below which a start that fails has run into it
+#: distance to a source, over the size of the membrane, below which a start that fails has run into it
 NEAR = 0.2
-#: from this many times that volume a membrane is inflated further if a dome of the wanted volume is too far from its equilibrium
+#: distance to a source, over the size of the membrane, at which it counts as touching it
+CONTACT = 1e-3
+#: from this many times that volume a membrane is inflated further if a guess at the wanted volume is too far from its equilibrium
 SAFE = 20.0
-#: up to this part of it every membrane is one to which linear elasticity applies: a guess that fails there is not tried smaller
-SMALL = 0.1
-#: the guess falls off to a support within this arc length
-_EDGE = 1.5
+#: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
+HUGE = 1e12
+#: most steps along a branch in each direction, and corrections of a guess
+_STEPS, _CORRECTIONS = 300, 40
 
 
 def moderate(potential: Potential) -> float:
     """By how much the volume of a moderately inflated membrane differs from that at rest."""
-    return max(START_VOLUME, START_SHARE * abs(potential.space.reference_volume))
-
-
-def guess_at_volume(potential: Potential, volume: float) -> Array:
-    """Coefficients of a smooth shape that respects the supports and encloses a volume."""
-    if isinstance(potential.space.mesh, Disc):
-        return spherical_dome(potential, volume)
-    direction = _normal(potential.space)
-    amplitudes = np.array([-1.0, 0.0, 1.0, 2.0])
-    # the volume is a cubic in the amplitude: so through four values exactly
-    volumes = np.array([potential.evaluate(a * direction, 0.0).volume for a in amplitudes])
-    cubic = np.linalg.solve(np.vander(amplitudes), volumes)
-    cubic[np.abs(cubic) < 1e-14 * np.abs(cubic).max()] = 0.0
-    cubic[-1] = potential.space.reference_volume - volume
-    roots = np.roots(cubic)
-    real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots))].real
-    return float(real[np.argmin(np.abs(real))]) * direction if real.size else direction
-
-
-def _normal(space: Space) -> Array:
-    """Coefficients of the unit normal of the reference meridian, falling off to ends that hold a component of it."""
-    s = space.interpolation_points()
-    R_s, Z_s = space.mesh.tangent(s)
-    J = np.hypot(R_s, Z_s)
-    n_u, n_w = -Z_s / J, R_s / J
-    length = np.concatenate([[0.0], np.cumsum(space.lengths)])
-    along = length[:-1] + (s - space.ends[:-1]) / space.sizes * space.lengths
-    held = [
-        ("u" in support.held and abs(n_u[place]) > 1e-9) or ("w" in support.held and abs(n_w[place]) > 1e-9)
-        for support, place in zip(space.supports, ((0, 0), (-1, -1)), strict=False)
-    ]
-    edge = min(_EDGE, length[-1] / max(sum(held), 1))
-    factor = np.ones_like(s)
-    for is_held, distance_ in zip(held, (along, length[-1] - along), strict=False):
-        if is_held:
-            factor = factor * (1 - (1 - np.minimum(1.0, distance_ / edge)) ** 2)
-    return space.interpolate(factor * n_u, factor * n_w)
-
-
-def spherical_dome(potential: Potential, volume: float) -> Array:
-    """Coefficients of a spherical cap over the rim that encloses a volume, material points at equal angles.
-
-    The height H solves pi H (H^2 + 3)/6 = V: with H = 2 sinh t this is sinh 3t = 3 V/pi, exact down to the smallest volumes.
-    """
     space = potential.space
-    s = space.interpolation_points()
-    height = 2 * np.sinh(np.arcsinh(volume * (3 / np.pi)) / 3)
-    if height == 0:
-        return np.zeros(space.n_free)
-    radius = (1 + height**2) / (2 * height)
-    angle = 2 * np.arctan(height)
-    u = radius * (_sine_excess(angle * s) - s * _sine_excess(np.asarray(angle)))  # radius sin(angle s) - s, for radius sin(angle) = 1
-    eta = 2 * radius * np.sin(angle * (1 + s) / 2) * np.sin(angle * (1 - s) / 2)
-    return space.interpolate(u, eta)
-
-
-def _sine_excess(x: Array) -> Array:
-    """sin x - x without cancellation: the radial displacement of a nearly flat dome is far below round-off of its radius."""
-    square = x**2
-    series = -x * square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
-    return np.where(square < 0.1, series, np.sin(x) - x)
+    return max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
 
 
 def start_at_volume(potential: Potential, volume: float) -> State:
-    """The equilibrium at a volume that is reached by inflating first and turning the sources on afterwards.
+    """The equilibrium at a volume that is reached by inflating first and turning sources and loads on afterwards.
 
     Raises
     ------
     SolveError
-        When the path ends before the full strength of the sources, or a dome cannot be inflated to the volume.
+        When none of the ways arrives.
     """
-    surrounded, rest = potential.surrounded, potential.space.reference_volume
     if at_rest(potential, "volume", volume):
         return flat_state(potential)
-    if surrounded and potential.space.loose:
-        return _from_unanchored(potential, volume)
-    failure = None
-    # less a margin: rest + moderate - rest, what is inflated to from here, may be rounded down
-    if surrounded and abs(volume - rest) < moderate(potential) * (1 - 1e-12):
+    if not potential.surrounded:
+        return _inflated(potential, volume)
+    return _first_of(_ways_to_volume(potential, volume), f"V = {volume:.6g}")
+
+
+Way = Callable[[], State | None]
+_GUESS = "a guess"
+
+
+def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
+    """The state of the first way that arrives; else an error with what each of them said, that of the best reason first."""
+    failures: list[SolveError] = []
+    tried: list[str] = []
+    for name, way in ways:
+        if name.startswith(_GUESS) and any(f.status.ill_posed for f in failures):
+            break  # the branch ends there; a guess would land beyond its end, on what the mesh makes of it
+        tried.append(name)
         try:
-            return _from_either_side(volume, lambda first, state: march(potential, state, VolumeControl, first, volume)[-1], potential)
+            state = way()
         except SolveError as error:
-            if volume == rest:  # nowhere to turn the sources on but at the flat state itself
-                raise
-            failure = error
-    state = _inflated(potential, volume)
-    if not surrounded:
+            failures.append(error)
+            continue
+        if state is not None:
+            return state
+    order = [Status.SLACK, Status.LEGENDRE_FAILURE, Status.DIPOLE_CONTACT]
+    failures.sort(key=lambda f: order.index(f.status) if f.status in order else len(order))
+    said = f" (first: {failures[0]})" if failures else ""
+    status = failures[0].status if failures else Status.NO_EQUILIBRIUM
+    raise SolveError(f"no equilibrium was found at {wanted}; tried: {', '.join(tried)}{said}", status=status)
+
+
+def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, Way]]:
+    rest, size = potential.space.reference_volume, moderate(potential)
+    # less a margin: rest + moderate - rest, what is inflated to from here, may be rounded down
+    near = abs(volume - rest) < size * (1 - 1e-12)
+    if near and not potential.space.loose:
+        for side in _sides(volume):
+            first = rest + side * size
+            yield f"the branch from V = {first:.6g}", lambda first=first: _along_volume(potential, first, volume)  # type: ignore[misc]
+    if volume != rest or not potential.flat:
+        yield "sources and loads turned on there", lambda: _with_fields(potential, volume)
+    if not near and not potential.space.loose:
+        first = rest + float(np.copysign(size, volume - rest))
+        yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), "volume", volume)
+    yield f"{_GUESS} there", lambda: _held(potential, VolumeControl(volume), volume, 0.0)
+
+
+def _sides(load: float) -> tuple[float, float]:
+    """That of the load comes first, so that a mirrored scene takes the mirrored path; of no load the upper one."""
+    return (1.0, -1.0) if load >= 0 else (-1.0, 1.0)
+
+
+def _along_volume(potential: Potential, first: float, volume: float) -> State:
+    state = _with_fields(potential, first)
+    return march(potential, state, VolumeControl, first, volume)[-1]
+
+
+def _with_fields(potential: Potential, volume: float) -> State:
+    """The bare membrane at a volume, and its sources and loads turned on there."""
+    bare = _inflated(potential, volume)
+    control = VolumeControl(volume)
+    if potential.space.loose:  # nothing else holds it along the axis: they cannot be turned on slowly
+        x = bare.x if bare.evaluation.potential is potential else transferred(bare.evaluation.potential.space, bare.x, potential.space)
+        result = correct(potential, control, x, bare.pressure, damped=True, max_iterations=_CORRECTIONS)
+        state = State.of(result) if result.status is Status.CONVERGED else None
+        if state is None:
+            state = follow_homotopy(Held(potential, control, x, bare.pressure), x, bare.pressure)
+        if state is None:
+            raise SolveError(
+                f"no place was found in which the sources hold the membrane at V = {volume:.6g}; nothing else holds it along the axis",
+                status=Status.NO_EQUILIBRIUM,
+            )
         return state
     try:
-        return march(potential, state, lambda t: VolumeControl(volume), 0.0, 1.0, parameter="magnetic")[-1]
+        return march(potential, bare, lambda t: control, 0.0, 1.0, parameter="magnetic")[-1]
     except SolveError as error:
-        if failure is not None and failure.status.ill_posed:  # the better reason
-            raise failure from None
-        touching = potential.distance_to_sources((error.result or [state])[-1].x) < NEAR
+        state = follow_homotopy(Fields(potential, control), bare.x, bare.pressure)
+        if state is not None:
+            return state
+        last = (error.result or [bare])[-1]
+        touching = potential.distance_to_sources(last.x) < NEAR * potential.space.unit
         raise SolveError(
-            f"the sources could not be turned on to their full strength at V = {volume:.6g}; "
-            f"try another volume or a lower strength ({error})",
+            f"the sources could not be turned on to their full strength at V = {volume:.6g}; try another volume or a lower strength",
             status=Status.DIPOLE_CONTACT if touching else Status.NO_EQUILIBRIUM,
         ) from error
 
 
-def _from_unanchored(potential: Potential, volume: float) -> State:
-    """As :func:`start_at_volume` where nothing but the sources holds the membrane in its place: these are turned on at once."""
-    bare = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
-    state = _inflated(bare, volume)
-    guess = transferred(bare.space, state.x, potential.space)
-    result = correct(potential, VolumeControl(volume), guess, state.pressure, damped=True, max_iterations=40)
-    if result.status is not Status.CONVERGED:
-        raise SolveError(
-            f"no place was found in which the sources hold the membrane at V = {volume:.6g}; nothing else holds it along the axis",
-            status=Status.NO_EQUILIBRIUM,
-        )
-    return State.of(result)
-
-
 def _inflated(potential: Potential, volume: float) -> State:
-    """Equilibrium without sources."""
+    """Equilibrium without sources and loads; of a potential without them where only they would hold the membrane along the axis."""
+    if potential.space.loose:
+        potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
+    rest = potential.space.reference_volume
+    if volume == rest and not potential.flat:
+        return _resting(potential)
+    failure = None
+    for share in _shares(potential, abs(volume - rest)):
+        first = rest + share * (volume - rest)
+        state = _guessed(potential, first)
+        if state is None:
+            continue
+        if first == volume:
+            return state
+        try:
+            return march(potential, state, VolumeControl, first, volume, magnetic=0.0)[-1]
+        except SolveError as error:
+            failure = failure or error
+        bare = potential if not potential.surrounded else potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
+        there = state if bare is potential else _moved(bare, state, first)
+        found = None
+        if there is not None:
+            with suppress(SolveError):
+                found = _along(bare, there, "volume", volume)
+        if found is not None:
+            back = correct(potential, VolumeControl(volume), found.x, found.pressure, magnetic=0.0, damped=True)
+            if back.status is Status.CONVERGED:
+                return State.of(back)
+    why = failure or "no guess led to an equilibrium"
+    status = failure.status if failure else Status.NOT_CONVERGED
+    raise SolveError(f"the membrane could not be inflated to V = {volume:.6g} without sources and loads: {why}", status=status)
+
+
+def _resting(potential: Potential) -> State:
+    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0, magnetic=0.0))
+
+
+def _moved(onto: Potential, state: State, volume: float) -> State | None:
+    result = correct(onto, VolumeControl(volume), state.x, state.pressure, damped=True)
+    return State.of(result) if result.status is Status.CONVERGED else None
+
+
+def _shares(potential: Potential, excess: float) -> Iterator[float]:
+    """Shares of the way from rest at which a guess is tried: the whole, then from that to a safely inflated membrane down, then beyond."""
+    yield 1.0
+    safe = min(1.0, SAFE * moderate(potential) / excess) if excess else 1.0
+    if safe < 1:
+        yield safe
+    yield from (safe / 4**k for k in range(1, 6))
+    yield from (4.0, 16.0)  # where a tension field is taut
+
+
+def _guessed(potential: Potential, volume: float) -> State | None:
+    """The bare equilibrium next to a guess at a volume."""
+    control = VolumeControl(volume)
     with np.errstate(over="ignore", invalid="ignore"):  # a guess may be too large or small for its energy to be a number: not converged
         guess = guess_at_volume(potential, volume)
-        result = correct(potential, VolumeControl(volume), guess, 0.0, magnetic=0.0, damped=True, max_iterations=40)
-    if result.status is not Status.CONVERGED and not isinstance(potential.space.mesh, Disc):  # a minimiser goes downhill from farther away
-        found, p, _, _ = minimize(potential, VolumeControl(volume), guess, 0.0, magnetic=0.0)
+        result = correct(potential, control, guess, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
+        if result.status is Status.CONVERGED:
+            return State.of(result)
+        if not np.isfinite(potential.evaluate(guess, 0.0, 0.0).gradient).all():
+            return None
+        found, p, _, _ = minimize(potential, control, guess, 0.0, magnetic=0.0)  # goes downhill from farther away
         if np.isfinite(found).all() and np.isfinite(p):
-            result = correct(potential, VolumeControl(volume), found, p, magnetic=0.0)
-    if result.status is Status.CONVERGED:
-        return State.of(result)
-    bad = ill_posed(potential, result.evaluation)
-    if bad is not None and bad.slack:
-        raise SolveError(f"no tension holds a dome of volume {volume:.6g}: {bad}", status=Status.SLACK)
-    rest, size = potential.space.reference_volume, moderate(potential)
-    excess = abs(volume - rest)
-    if excess <= SMALL * size:
-        raise SolveError(f"no dome of volume {volume:.6g} could be inflated; {result.status.advice}", status=result.status)
-    # a guess may be far from the equilibrium, or, where a material locks, outside the domain of its energy
-    first = rest + np.copysign(SAFE * size if excess > SAFE * size else excess / 4, volume - rest)
-    return march(potential, _inflated(potential, first), VolumeControl, first, volume, magnetic=0.0)[-1]
+            result = correct(potential, control, found, p, magnetic=0.0)
+            if result.status is Status.CONVERGED:
+                return State.of(result)
+        return follow_homotopy(Held(potential, control, guess, 0.0, magnetic=0.0), guess, 0.0)
+
+
+def _held(
+    potential: Potential, control: Control, volume: float, pressure: float, accept: Callable[[State], bool] | None = None
+) -> State | None:
+    """An equilibrium under a control from the guess at a volume, with all sources and loads, held by dead forces that fade out."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        guess = guess_at_volume(potential, volume)
+        if not np.isfinite(potential.evaluate(guess, pressure).gradient).all():
+            return None
+        result = correct(potential, control, guess, pressure, damped=True, max_iterations=_CORRECTIONS)
+        if result.status is Status.CONVERGED and (accept is None or accept(State.of(result))):
+            return State.of(result)
+        return follow_homotopy(Held(potential, control, guess, pressure), guess, pressure, accept=accept)
+
+
+# --- other loads than a volume: the branch through a state at a volume leads there
 
 
 def start_at_pressure(potential: Potential, pressure: float) -> State:
@@ -188,71 +247,164 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
 
     The branch is followed by arc length from a small volume in the direction in which the pressure approaches the wanted one, then in
     the other; the first crossing that is a minimum under pressure control is returned. Where sources or loads act the branch may end
-    before it comes to the flat membrane, and another one begins on the other side of it: that one is tried last.
+    before it comes to the flat membrane, and another one begins on the other side of it: that one is tried last, and then guesses.
 
     Raises
     ------
     SolveError
-        With status NO_EQUILIBRIUM when neither direction crosses the pressure in a minimum.
+        When none of the ways arrives.
     """
     if at_rest(potential, "pressure", pressure):
         flat = flat_state(potential)
-        if not potential.surrounded or negative_directions(flat.evaluation.band, potential.space.half_bandwidth) == 0:
+        if not potential.surrounded or _is_minimum(flat):
             return flat
-    size, rest, load = moderate(potential), potential.space.reference_volume, pressure
+    size, load = moderate(potential), pressure
+    units = potential.space.units
     if potential.flat:
         # a nearly flat membrane obeys P = 3.34 V^3 without sources, and its mirror image carries the opposite pressure; weak ones add to it
-        lifted = pressure + _pull(potential)
-        nearly = (abs(lifted) / 4) ** (1 / 3)
+        load = pressure + _pull(potential)
+        nearly = (abs(load) / units["pressure"] / 4) ** (1 / 3)
         if not potential.surrounded or 0 < nearly <= NEARLY_FLAT:
-            size, load = min(size, nearly), lifted
-    volume, other = (rest + float(np.copysign(size, side * load)) for side in (1, -1))
-    found = _through(potential, start_at_volume(potential, volume), pressure)
-    if found is None and potential.surrounded:
-        with suppress(SolveError):  # the failure on this side of the flat membrane is the one to report
-            found = _through(potential, start_at_volume(potential, other), pressure)
-    if found is not None:
-        return found
-    raise SolveError(
-        f"no stable equilibrium at P = {pressure:.9g} was met on the branch through V = {volume:.6g}", status=Status.NO_EQUILIBRIUM
-    )
-
-
-def _through(potential: Potential, state: State, pressure: float) -> State | None:
-    """The first minimum at a pressure on the branch through a state, None if there is none."""
-    up = 1 if (state.pressure < pressure) == (first_point(potential, state, 1).rate("pressure", potential) > 0) else -1
-    for direction in (up, -up):
-        found = _first_minimum(potential, first_point(potential, state, direction), pressure)
-        if found is not None:
-            return found
-    return None
+            size = min(size, nearly * units["volume"])
+    return _first_of(_ways_from(potential, "pressure", pressure, size, _sides(load), _is_minimum), f"P = {pressure:.9g} that is stable")
 
 
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
     if at_rest(potential, "height", height):
         return flat_state(potential)
-
-    def follow(_: float, state: State) -> State:
-        here = potential.space.center_height(state.x)
-        return march(potential, state, CenterHeightControl, here, height)[-1] if height != here else state
-
-    return _from_either_side(height, follow, potential)
+    sides = _sides(height - potential.space.first_height * (not potential.flat))
+    ways = _ways_from(potential, "center_height", height, moderate(potential), sides)
+    return _first_of(ways, f"a pole height of {height:.6g}")
 
 
-def _from_either_side(load: float, follow: Callable[[float, State], State], potential: Potential) -> State:
-    """The state that is reached from the membrane moderately inflated to the side of a load, or else to the other side.
+def start_in_gas(potential: Potential, gas: Gas) -> State:
+    """The equilibrium with an amount of gas behind the membrane, on the branch through the moderately inflated one."""
+    sides = _sides(gas.pressure(potential.space.reference_volume))
+    ways = _ways_from(potential, gas, gas.amount, moderate(potential), sides)
+    return _first_of(ways, f"an amount of gas of {gas.amount:.6g}")
 
-    The side of the load comes first, so that a mirrored scene takes the mirrored path.
-    """
-    rest, side = potential.space.reference_volume, float(np.copysign(moderate(potential), load))
-    try:
-        return follow(rest + side, start_at_volume(potential, rest + side))
-    except SolveError as failure:
+
+def _ways_from(
+    potential: Potential,
+    quantity: str | Gas,
+    load: float,
+    size: float,
+    sides: tuple[float, float],
+    accept: Callable[[State], bool] | None = None,
+) -> Iterator[tuple[str, Way]]:
+    """Ways to a load that is no volume."""
+    rest = potential.space.reference_volume
+    for side in sides:
+        first = rest + side * size
+        yield (
+            f"the branch through V = {first:.6g}",
+            lambda first=first: _along(potential, start_at_volume(potential, first), quantity, load, accept),  # type: ignore[misc]
+        )
+    pressure = load if quantity == "pressure" else 0.0
+    for side in sides:
+        for share in (1.0, 4.0, 16.0):
+            guess = rest + side * share * size
+            yield (
+                f"{_GUESS} with V = {guess:.6g}",
+                lambda guess=guess: _held(potential, _control(quantity, load), guess, pressure, accept),  # type: ignore[misc]
+            )
+
+
+def _control(quantity: str | Gas, load: float) -> Control:
+    if isinstance(quantity, Gas):
+        return quantity
+    return {"volume": VolumeControl, "pressure": PressureControl, "center_height": CenterHeightControl}[quantity](load)
+
+
+def _along(
+    potential: Potential, state: State, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None = None
+) -> State | None:
+    """The first state at a load, that will do, on the branch through a state; None if there is none within the bounds."""
+    point = first_point(potential, state, 1)
+    rises = (load - _amount(potential, point, quantity)) * _rate(potential, point, quantity) >= 0
+    failure = None
+    for direction in (1, -1) if rises else (-1, 1):
         try:
-            return follow(rest - side, start_at_volume(potential, rest - side))
-        except SolveError:
-            raise failure from None
+            found = _first_met(potential, first_point(potential, state, direction), quantity, load, accept)
+        except SolveError as error:
+            failure = failure or error
+            continue
+        if found is not None:
+            return found
+    if failure is not None:
+        raise failure
+    return None
+
+
+def _amount(potential: Potential, point: BranchPoint, quantity: str | Gas) -> float:
+    state = point.state
+    if isinstance(quantity, Gas):
+        return (state.pressure + quantity.atmosphere) * (state.volume + quantity.chamber)
+    values = {"volume": state.volume, "pressure": state.pressure, "center_height": potential.space.center_height(state.x)}
+    return values[quantity]
+
+
+def _rate(potential: Potential, point: BranchPoint, quantity: str | Gas) -> float:
+    if isinstance(quantity, Gas):
+        total, absolute = point.state.volume + quantity.chamber, point.state.pressure + quantity.atmosphere
+        return point.rate("pressure", potential) * total + absolute * point.rate("volume", potential)
+    return point.rate(quantity, potential)
+
+
+def _first_met(
+    potential: Potential, point: BranchPoint, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None
+) -> State | None:
+    if _amount(potential, point, quantity) == load and (accept is None or accept(point.state)):
+        return point.state
+    away = abs(point.state.volume - potential.space.reference_volume) / potential.space.units["volume"]
+    control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
+    tracer = Tracer(Path(), control.first * min(1.0, np.sqrt(away)), control)
+    for _, new in zip(range(_STEPS), trace_points(potential, point, tracer), strict=False):
+        for state in _met(Segment(potential, point, new), quantity, load, accept):
+            return state
+        if is_slack(potential, new.state):
+            raise slackness(potential, new.state)
+        if potential.distance_to_sources(new.state.x) < CONTACT * potential.space.unit or unresolved_source(potential, new.state.x):
+            raise SolveError(f"the branch runs into a source at V = {new.state.volume:.6g}", status=Status.DIPOLE_CONTACT)
+        point = new
+        size = np.sqrt(inner(potential, new.state.x, new.state.pressure, new.state.x, new.state.pressure))
+        if size > HUGE:
+            return None
+        tracer.step = min(tracer.step, StepControl.largest * (1 + size))  # in proportion to the membrane
+    return None
+
+
+def _met(segment: Segment, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
+    """States at the load on a segment that will do."""
+    if isinstance(quantity, Gas):
+        yield from _gas_met(segment, quantity)
+        return
+    for met in segment.crossings(quantity, load):
+        # at the limit point itself round-off has the sign of the smallest eigenvalue: there the side that is stable says it
+        at_limit = quantity == "pressure" and any(met is fold.point for fold in segment.folds("limit_point"))
+        judged = (segment.a, segment.b) if at_limit else (met,)
+        if accept is None or any(accept(p.state) for p in judged):
+            yield met.state
+
+
+def _gas_met(segment: Segment, gas: Gas) -> Iterator[State]:
+    """The state at the amount of a gas between two points of a branch, both of which compress it."""
+    ends = (segment.a, segment.b)
+    held = [_amount(segment.potential, point, gas) - gas.amount for point in ends]
+    if held[0] * held[1] > 0 or any(point.state.volume <= -gas.chamber for point in ends):
+        return
+    a, b = ends
+    share = held[0] / (held[0] - held[1])
+    near = segment.at(share) if 0 < share < 1 else b
+    result = correct(segment.potential, gas, near.state.x, near.state.pressure, damped=True)
+    if result.status is Status.CONVERGED:
+        yield State.of(result)
+
+
+def _is_minimum(state: State) -> bool:
+    """Whether a state is a minimum under pressure control."""
+    return negative_directions(state.evaluation.band, state.evaluation.potential.space.half_bandwidth) == 0
 
 
 def _pull(potential: Potential) -> float:
@@ -260,28 +412,7 @@ def _pull(potential: Potential) -> float:
     if not potential.surrounded:
         return 0.0
     flat, across = np.zeros(potential.space.n_free), potential.space.fields[1]
-    evaluation, dome = potential.evaluate(flat, 0.0), guess_at_volume(potential, 1e-6)
+    shallow = 1e-6 * potential.space.units["volume"]
+    evaluation, dome = potential.evaluate(flat, 0.0), guess_at_volume(potential, shallow)
     return float(-(evaluation.gradient[across] @ dome[across]) / (evaluation.volume_gradient[across] @ dome[across]))
 
-
-def _first_minimum(potential: Potential, point: BranchPoint, pressure: float, steps: int = 300) -> State | None:
-    # long inflated or singular tails carry no further crossing of interest: bounded by the number of steps
-    kd = potential.space.half_bandwidth
-    if point.state.pressure == pressure and negative_directions(point.state.evaluation.band, kd) == 0:
-        return point.state
-    tracer = Tracer(Path(), StepControl().first * min(1.0, np.sqrt(abs(point.state.volume - potential.space.reference_volume))))
-    try:
-        for _, new in zip(range(steps), trace_points(potential, point, tracer), strict=False):
-            segment = Segment(potential, point, new)
-            for met in segment.crossings("pressure", pressure):
-                # at the limit point itself round-off has the sign of the smallest eigenvalue: there the side that is stable says it
-                at_limit = any(met is fold.point for fold in segment.folds("limit_point"))
-                judged = (point, new) if at_limit else (met,)
-                if any(negative_directions(p.state.evaluation.band, kd) == 0 for p in judged):
-                    return met.state
-            if is_slack(potential, new.state):
-                return None
-            point = new
-    except SolveError:
-        return None
-    return None

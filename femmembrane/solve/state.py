@@ -67,12 +67,14 @@ def flat_state(potential: Potential) -> State:
 
 
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:
-    """Mesh-independent inner product of (x, P) and (y, Q): mean over the reference area of the displacements, plus P Q."""
-    return band_inner(potential.mass, potential.space.half_bandwidth, x, y) / potential.area + p * q
+    """Mesh-independent inner product of (x, P) and (y, Q), in units of the membrane's own size: mean over the reference area of the
+    displacements, plus P Q."""
+    square = potential.space.unit**2
+    return band_inner(potential.mass, potential.space.half_bandwidth, x, y) / (potential.area * square) + p * q * square
 
 
 def distance(potential: Potential, x: Array, y: Array) -> float:
-    """Root mean square of the difference of two displacements over the reference area."""
+    """Root mean square of the difference of two displacements over the reference area, in units of the membrane's own size."""
     d = x - y
     return float(np.sqrt(max(inner(potential, d, 0.0, d, 0.0), 0.0)))
 

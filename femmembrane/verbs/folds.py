@@ -20,11 +20,11 @@ from ..solve import wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
 from ..solve.parameter import Parameter
+from ..solve.start import CONTACT
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
 from .recording import record
-from .trace import CONTACT
 
 Array = NDArray[np.float64]
 
@@ -259,8 +259,8 @@ class _Following:
             bad = wellposed.ill_posed(self.system.family, new.evaluation)
             if bad is not None and ill_posed == "stop":
                 return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh", False
-            if self._clearance(new) < CONTACT:
-                return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at {self._place(new)}", False
+            if self._clearance(new) < (least := CONTACT * self.system.family.space.unit):
+                return Status.DIPOLE_CONTACT, f"the membrane came within {least:g} of a source at {self._place(new)}", False
             point = new
         return Status.STEP_LIMIT, f"{max_steps} steps were made without meeting a bound of {self.parameter.name}", False
 
@@ -288,7 +288,7 @@ class _Following:
 
     def _ended(self, error: SolveError, point: FoldPoint) -> tuple[Status, str]:
         near = self._clearance(point)
-        if near < 50 * CONTACT:
+        if near < 50 * CONTACT * self.system.family.space.unit:
             return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
         wrinkled = self.system.family.scene.tension_field and not point.evaluation.stress.all()
         hint = "; where zones of wrinkles end a tension field has no third derivatives, which this needs: trace at each value instead"

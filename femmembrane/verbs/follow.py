@@ -21,7 +21,7 @@ from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
 from ..solve.search import Limit, beyond_limit
 from ..solve.special_points import ON_FOLD
-from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume
+from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume, start_in_gas
 from ..solve.state import Path, State, at_rest, distance, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness, unresolved_source
@@ -285,12 +285,14 @@ class _Turn:
     def __str__(self) -> str:
         fold, landing = self.limit.fold, self.limit.landing
         if fold is None:
-            return "the branch could not be followed there, and no fold was found where it would turn back"
+            return "steps in the load did not converge there, and along the branch no fold in it was met"
         at = fold.point.state
         what = fold.kind.replace("_", " ")
-        where = f"there is no equilibrium near; the {what} is P = {at.pressure:.9g}, V = {at.volume:.9g}"
+        where = f"the branch turns back: the {what} is P = {at.pressure:.9g}, V = {at.volume:.9g}"
         if landing is None:
-            return f"{where}, and no stable state was met beyond it"
+            last = self.limit.last
+            far = "" if last is None else f", as far as V = {last.volume:.6g}, P = {last.pressure:.6g}"
+            return f"{where}; it was followed on{far}, without meeting a stable state at this load"
         return f"{where}, from which the membrane would jump to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
 
 
@@ -299,7 +301,8 @@ def _load_of(start: Equilibrium, control: str, potential: Potential, state: Stat
     given = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
     height = potential.space.center_height(state.x)
     found = {"volume": state.evaluation.volume, "pressure": state.pressure, "height": height}[control]
-    return given if abs(found - given) <= 1e-9 * max(abs(given), 1.0) else float(found)
+    unit = potential.space.units[{"height": "center_height"}.get(control, control)]
+    return given if abs(found - given) <= 1e-9 * max(abs(given), unit) else float(found)
 
 
 class _Walk:
@@ -414,7 +417,7 @@ class _Walk:
         if (
             result.status in (Status.NOT_CONVERGED, Status.NOT_A_MINIMUM)
             and self.quantity == "pressure"
-            and abs(guess.pressure - load) <= ON_FOLD * (1 + abs(load))
+            and abs(guess.pressure - load) <= ON_FOLD * (self.potential.space.units["pressure"] + abs(load))
         ):
             return guess  # a limit point at this very pressure, which no corrector finds under pressure control
         if result.status is not Status.CONVERGED:
@@ -446,9 +449,9 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
     potential = potential_of(scene)
     if rests_flat(potential) and gas.pressure(potential.space.reference_volume) == 0:
         return record(scene, potential, flat_state(potential), clock=clock, gas=gas)
-    state = (
-        start_at_volume(potential, potential.space.reference_volume + moderate(potential)) if start is None else resume(potential, start)
-    )
+    if start is None:
+        return record(scene, potential, start_in_gas(potential, gas), clock=clock, gas=gas)
+    state = resume(potential, start)
     # the amount that holds the state at hand is known: march from it to the wanted one
     held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
     if held <= 0 or state.volume <= -gas.chamber:

@@ -15,7 +15,7 @@ from ..scene import QUANTITIES, Scene
 from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
-from ..solve.start import moderate, start_at_volume
+from ..solve.start import CONTACT, moderate, start_at_volume
 from ..solve.state import Path, at_rest
 from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
@@ -23,8 +23,6 @@ from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
 
-#: distance to a source at which the membrane counts as touching it
-CONTACT = 1e-3
 
 
 @one_thread
@@ -317,7 +315,7 @@ class _Tracing:
         if unresolved := wellposed.unresolved_source(self.potential, new.state.x):
             return Status.DIPOLE_CONTACT, f"{unresolved} (V = {new.state.volume:.6g})"
         if self._contact(new):
-            return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT:g} of a source at V = {new.state.volume:.6g}"
+            return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT * self.potential.space.unit:g} of a source at V = {new.state.volume:.6g}"
         return None
 
     def _ill_posed(self, point: BranchPoint) -> tuple[Status, str] | None:
@@ -372,11 +370,11 @@ class _Tracing:
         return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq, azimuthal=azimuthal)
 
     def _contact(self, point: BranchPoint) -> bool:
-        return self.potential.distance_to_sources(point.state.x) < CONTACT
+        return self.potential.distance_to_sources(point.state.x) < CONTACT * self.potential.space.unit
 
     def _ended(self, error: SolveError) -> tuple[Status, str]:
         near = self.potential.distance_to_sources(self.point.state.x)
-        if near < 50 * CONTACT:
+        if near < 50 * CONTACT * self.potential.space.unit:
             return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
         return error.status, str(error)
 

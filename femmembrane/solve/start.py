@@ -32,7 +32,7 @@ from .newton import correct
 from .special_points import Segment
 from .state import Path, State, at_rest, flat_state, inner
 from .stepping import march
-from .wellposed import is_slack, slackness, unresolved_source
+from .wellposed import ill_posed, is_slack, slackness, unresolved_source
 
 #: a moderately inflated membrane holds this much more than at rest, in units of its own size, or that part of it. Below, one with sources
 #: is reached from there: turning sources on at the flat state starts from a singular Hessian
@@ -80,8 +80,9 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
     """The state of the first way that arrives; else an error with what each of them said, that of the best reason first."""
     failures: list[SolveError] = []
     tried: list[str] = []
+    spare = None
     for name, way in ways:
-        if name.startswith(_GUESS) and any(f.status.ill_posed for f in failures):
+        if name.startswith(_GUESS) and (spare or any(f.status.ill_posed for f in failures)):
             break  # the branch ends there; a guess would land beyond its end, on what the mesh makes of it
         tried.append(name)
         try:
@@ -89,8 +90,11 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
         except SolveError as error:
             failures.append(error)
             continue
-        if state is not None:
+        if state is not None and _well_posed(state):
             return state
+        spare = spare or state
+    if spare is not None:
+        return spare
     order = [Status.SLACK, Status.LEGENDRE_FAILURE, Status.DIPOLE_CONTACT]
     failures.sort(key=lambda f: order.index(f.status) if f.status in order else len(order))
     said = f" (first: {failures[0]})" if failures else ""
@@ -161,10 +165,14 @@ def _inflated(potential: Potential, volume: float) -> State:
     rest = potential.space.reference_volume
     if volume == rest and not potential.flat:
         return _resting(potential)
-    failure = None
+    if not (potential.flat or potential.space.lids) and volume * rest < 0:
+        return _mirrored(potential, _inflated(potential, -volume), volume)
+    failure = spare = None
     for share in _shares(potential, abs(volume - rest)):
         first = rest + share * (volume - rest)
         state = _guessed(potential, first)
+        if state is not None and not _well_posed(state):
+            spare, state = (spare or state) if first == volume else spare, None
         if state is None:
             continue
         if first == volume:
@@ -183,9 +191,24 @@ def _inflated(potential: Potential, volume: float) -> State:
             back = correct(potential, VolumeControl(volume), found.x, found.pressure, magnetic=0.0, damped=True)
             if back.status is Status.CONVERGED:
                 return State.of(back)
+    if spare is not None:
+        return spare
     why = failure or "no guess led to an equilibrium"
     status = failure.status if failure else Status.NOT_CONVERGED
     raise SolveError(f"the membrane could not be inflated to V = {volume:.6g} without sources and loads: {why}", status=status)
+
+
+def _mirrored(potential: Potential, state: State, volume: float) -> State:
+    """A bare membrane whose ends are in the plane z = 0 turned inside out: no stretch changes when its shape is mirrored in that plane."""
+    space, w = potential.space, potential.space.fields[1]
+    _, Z = space.mesh.position(space.interpolation_points())
+    height = space.interpolate(np.zeros_like(Z), Z)
+    x = state.x.copy()
+    x[w] = -x[w] - 2 * height[w]
+    result = correct(potential, VolumeControl(volume), x, -state.pressure, magnetic=0.0, damped=True)
+    if result.status is not Status.CONVERGED:
+        raise SolveError(f"the membrane could not be turned inside out to V = {volume:.6g}", status=result.status)
+    return State.of(result)
 
 
 def _resting(potential: Potential) -> State:
@@ -242,8 +265,9 @@ def _held(
 # --- other loads than a volume: the branch through a state at a volume leads there
 
 
-def start_at_pressure(potential: Potential, pressure: float) -> State:
-    """The first stable equilibrium at a pressure on the branch through the moderately inflated membrane.
+def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = True) -> State:
+    """The first stable equilibrium at a pressure on the branch through the moderately inflated membrane; where none is met and ``stable``
+    is False, the first.
 
     The branch is followed by arc length from a small volume in the direction in which the pressure approaches the wanted one, then in
     the other; the first crossing that is a minimum under pressure control is returned. Where sources or loads act the branch may end
@@ -266,7 +290,12 @@ def start_at_pressure(potential: Potential, pressure: float) -> State:
         nearly = (abs(load) / units["pressure"] / 4) ** (1 / 3)
         if not potential.surrounded or 0 < nearly <= NEARLY_FLAT:
             size = min(size, nearly * units["volume"])
-    return _first_of(_ways_from(potential, "pressure", pressure, size, _sides(load), _is_minimum), f"P = {pressure:.9g} that is stable")
+    try:
+        return _first_of(_ways_from(potential, "pressure", pressure, size, _sides(load), _is_minimum), f"P = {pressure:.9g} that is stable")
+    except SolveError:
+        if stable:
+            raise
+    return _first_of(_ways_from(potential, "pressure", pressure, size, _sides(load)), f"P = {pressure:.9g}")
 
 
 def start_at_height(potential: Potential, height: float) -> State:
@@ -274,7 +303,10 @@ def start_at_height(potential: Potential, height: float) -> State:
     if at_rest(potential, "height", height):
         return flat_state(potential)
     sides = _sides(height - potential.space.first_height * (not potential.flat))
-    ways = _ways_from(potential, "center_height", height, moderate(potential), sides)
+    size = moderate(potential)
+    if potential.flat and not potential.surrounded:  # a branch leads past the flat membrane, which has no stiffness, nowhere near it
+        size = min(size, 2 * abs(height) * potential.space.unit**2)
+    ways = _ways_from(potential, "center_height", height, size, sides)
     return _first_of(ways, f"a pole height of {height:.6g}")
 
 
@@ -295,12 +327,13 @@ def _ways_from(
 ) -> Iterator[tuple[str, Way]]:
     """Ways to a load that is no volume."""
     rest = potential.space.reference_volume
-    for side in sides:
-        first = rest + side * size
-        yield (
-            f"the branch through V = {first:.6g}",
-            lambda first=first: _along(potential, start_at_volume(potential, first), quantity, load, accept),  # type: ignore[misc]
-        )
+    for share in (1.0, 10.0, 100.0):  # further out where the first branch ends, or takes too many steps
+        for side in sides:
+            first = rest + side * share * size
+            yield (
+                f"the branch through V = {first:.6g}",
+                lambda first=first: _along(potential, start_at_volume(potential, first), quantity, load, accept),  # type: ignore[misc]
+            )
     pressure = load if quantity == "pressure" else 0.0
     for side in sides:
         for share in (1.0, 4.0, 16.0):
@@ -360,9 +393,12 @@ def _first_met(
     away = abs(point.state.volume - potential.space.reference_volume) / potential.space.units["volume"]
     control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
     tracer = Tracer(Path(), control.first * min(1.0, np.sqrt(away)), control)
+    spare = None
     for _, new in zip(range(_STEPS), trace_points(potential, point, tracer), strict=False):
         for state in _met(Segment(potential, point, new), quantity, load, accept):
-            return state
+            if _well_posed(state):
+                return state
+            spare = spare or state
         if is_slack(potential, new.state):
             raise slackness(potential, new.state)
         if potential.distance_to_sources(new.state.x) < CONTACT * potential.space.unit or unresolved_source(potential, new.state.x):
@@ -370,9 +406,9 @@ def _first_met(
         point = new
         size = np.sqrt(inner(potential, new.state.x, new.state.pressure, new.state.x, new.state.pressure))
         if size > HUGE:
-            return None
+            return spare
         tracer.step = min(tracer.step, StepControl.largest * (1 + size))  # in proportion to the membrane
-    return None
+    return spare
 
 
 def _met(segment: Segment, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
@@ -400,6 +436,10 @@ def _gas_met(segment: Segment, gas: Gas) -> Iterator[State]:
     result = correct(segment.potential, gas, near.state.x, near.state.pressure, damped=True)
     if result.status is Status.CONVERGED:
         yield State.of(result)
+
+
+def _well_posed(state: State) -> bool:
+    return ill_posed(state.evaluation.potential, state.evaluation) is None
 
 
 def _is_minimum(state: State) -> bool:

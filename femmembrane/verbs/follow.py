@@ -33,10 +33,11 @@ from .trace import resume_trace, trace
 
 _SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
 _CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl, "height": CenterHeightControl}
-_STARTS: dict[str, Callable[[Potential, float], State]] = {
-    "volume": start_at_volume,
-    "pressure": start_at_pressure,
-    "height": start_at_height,
+#: cold starts at a load; the last argument says whether only a stable state will do
+_STARTS: dict[str, Callable[[Potential, float, bool], State]] = {
+    "volume": lambda potential, load, stable: start_at_volume(potential, load),
+    "pressure": lambda potential, load, stable: start_at_pressure(potential, load, stable=stable),
+    "height": lambda potential, load, stable: start_at_height(potential, load),
 }
 #: the controls of a minimiser; a height is held by no potential
 _MINIMISED = ("volume", "pressure")
@@ -412,7 +413,7 @@ class _Walk:
         return not x.any() and rests_flat(self.potential)
 
     def _first(self, load: float) -> State:
-        guess = self.cold(self.potential, load)
+        guess = self.cold(self.potential, load, self.corrector is not correct)
         result = self.corrector(self.potential, self.control_at(load), guess.x, guess.pressure)
         if (
             result.status in (Status.NOT_CONVERGED, Status.NOT_A_MINIMUM)

@@ -27,6 +27,7 @@ class Status(StrEnum):
     UNEXPLAINED_INERTIA = "unexplained change of inertia"
     ACCURACY_NOT_MET = "accuracy not met"
     INTERRUPTED = "interrupted"
+    CLOSED = "closed branch"
 
     @property
     def advice(self) -> str:
@@ -49,6 +50,7 @@ _ADVICE = {
     Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",
     Status.ACCURACY_NOT_MET: "ask for less (mesh.accuracy), or give mesh.elements and mesh.degree",
     Status.INTERRUPTED: "what was computed is kept; continue from there",
+    Status.CLOSED: "the branch came back to the branch point where it set out: going on would trace it once more",
     Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh; "
     "a tension field (effects.tension_field = true) wrinkles instead",
     Status.SLACK: "the tension field ends here: where no tension is left along the meridian the membrane folds onto itself; "

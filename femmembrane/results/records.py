@@ -248,6 +248,8 @@ class SpecialPoint:
     equilibrium : Equilibrium
     azimuthal : int
         For an azimuthal onset: the number of waves against which stability is lost or regained there.
+    tangent : ndarray, shape (n_free + 1,), or None
+        For a branch point: the direction in (x, P) of the branch on which it was found, which tells it from the one that crosses there.
     """
 
     kind: str
@@ -257,6 +259,7 @@ class SpecialPoint:
     error: float
     equilibrium: Equilibrium = field(repr=False)
     azimuthal: int = field(default=0, kw_only=True)
+    tangent: Array | None = field(default=None, repr=False, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)

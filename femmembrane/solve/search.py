@@ -13,9 +13,10 @@ from ..potential import Array, Potential
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
 from .controls import Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, Equations, correct, relative_size
-from .special_points import FOLDS, Located, Segment
+from .special_points import FOLDS, Located, Segment, branch_point, crosses
 from .start import START_VOLUME, guess_at_volume, moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
+from .switching import Crossing, crossing_at, points_beyond, same_crossing
 from .wellposed import ill_posed, is_slack
 
 #: volumes of the domes from which branches and deflated iterations set out; from other shapes than flat ones: beyond that at rest, in
@@ -25,6 +26,8 @@ STARTS = (0.5, -0.5, 5.0, -5.0, 50.0, -50.0)
 SAME = 1e-6
 #: volume beyond which a branch is no longer followed
 FAR = 1e4
+#: most branch points at which the other branch is followed
+MOST_CROSSINGS = 24
 
 CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl}
 
@@ -42,7 +45,14 @@ class Search:
     iterations: int = 0
     deflations: int = 0
     ill_posed: list[State] = field(default_factory=list)
+    crossings: list[Crossing] = field(default_factory=list)
     _points: list[BranchPoint] = field(default_factory=list)
+    _halves: list[tuple[Crossing, int]] = field(default_factory=list)
+
+    @property
+    def followed(self) -> int:
+        """Number of branch points whose other branch was followed."""
+        return min(len(self.crossings), MOST_CROSSINGS)
 
     @property
     def starts(self) -> list[float]:
@@ -67,15 +77,43 @@ class Search:
     def _trace_both_ways(self, state: State) -> None:
         volumes = [state.volume]
         for direction in (1, -1):
-            for segment in follow(self.potential, first_point(self.potential, state, direction), self.max_steps):
-                self._points.append(segment.b)
-                volumes.append(segment.b.state.volume)
-                with suppress(SolveError):  # through the flat unloaded state there is no path
-                    for point in segment.crossings(self.quantity, self.load):
-                        self._add(point.state)
-                if abs(volumes[-1]) > FAR:
-                    break
+            volumes += self._walk(follow(self.potential, first_point(self.potential, state, direction), self.max_steps))
         self.traced.append((min(volumes), max(volumes)))
+        while self._halves:
+            crossing, direction = self._halves.pop(0)
+            volumes = self._walk(follow_beyond(self.potential, crossing, direction, self.max_steps))
+            if volumes:
+                self.traced.append((min(volumes), max(volumes)))
+
+    def _walk(self, segments: Iterator[Segment]) -> list[float]:
+        """Keep what a branch meets, as far as it is new; the volumes of its points."""
+        volumes = []
+        for segment in segments:
+            self._points.append(segment.b)
+            volumes.append(segment.b.state.volume)
+            with suppress(SolveError):  # through the flat unloaded state there is no path
+                for point in segment.crossings(self.quantity, self.load):
+                    self._add(point.state)
+            if self._meets_known_branch(segment) or abs(volumes[-1]) > FAR:
+                break
+        return volumes
+
+    def _meets_known_branch(self, segment: Segment) -> bool:
+        """Note the branch point on a segment; whether the branch comes in there on a half of the other one, which is known then."""
+        located = crossing_on(self.potential, segment)
+        if located is None:
+            return False
+        for crossing in self.crossings:
+            if same_crossing(self.potential, crossing.known.state, located.point.state):
+                side = crossing.side(self.potential, segment.a)
+                self._halves = [(c, d) for c, d in self._halves if c is not crossing or d != side]
+                return side != 0
+        with suppress(SolveError):
+            crossing = crossing_at(self.potential, located.point)
+            self.crossings.append(crossing)
+            if len(self.crossings) <= MOST_CROSSINGS:
+                self._halves += [(crossing, 1), (crossing, -1)]
+        return False
 
     def _on_traced_branch(self, state: State) -> bool:
         """Whether a state lies between two traced points of nearly the same shape: a start on a known branch is not traced again."""
@@ -155,9 +193,34 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
         point = new
 
 
+def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_steps: int) -> Iterator[Segment]:
+    """As :func:`follow`, on a half of the branch that crosses at a branch point."""
+    tracer = Tracer(Path(), StepControl().first, StepControl())
+    points, point = points_beyond(potential, crossing, direction, tracer), crossing.half(direction)
+    for k in range(max_steps):
+        try:
+            new = next(points)
+        except SolveError:
+            return
+        yield Segment(potential, point, new, leaving=k == 0)
+        if is_slack(potential, new.state):
+            return
+        point = new
+
+
+def crossing_on(potential: Potential, segment: Segment) -> Located | None:
+    """The branch point on a segment, None where there is none, it cannot be located, or the states are folded shapes of the mesh."""
+    try:
+        located = branch_point(segment) if crosses(segment) else None
+    except SolveError:
+        return None
+    return located if located is not None and ill_posed(potential, located.point.state.evaluation) is None else None
+
+
 @dataclass(slots=True)
 class Limit:
-    """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one.
+    """Why a load cannot be reached: the fold where the branch turns back, or the branch point from which on it is unstable, and the next
+    stable state at the load, if there is one.
 
     ``ill_posed`` is the state at which the branch became so, slack or compressed, before either was met: what follows is the mesh's.
     """

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
 from ..potential import Potential
-from .continuation import BranchPoint, tangent_at
+from .continuation import BranchPoint, tangent_at, unit_point
 from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, correct
 from .state import State, flat_state, hermite, rests_flat
@@ -46,10 +46,18 @@ class Located:
 
 
 class Segment:
-    """The branch between two neighbouring points."""
+    """The branch between two neighbouring points.
 
-    def __init__(self, potential: Potential, a: BranchPoint, b: BranchPoint) -> None:
-        self.potential, self.a, self.b = potential, a, b
+    Parameters
+    ----------
+    potential, a, b : Potential, BranchPoint, BranchPoint
+    leaving : bool
+        Whether the first point is a crossing at which the branch was entered: there its own rates and its inertia are round-off, so that
+        nothing is looked for before the second point but given values.
+    """
+
+    def __init__(self, potential: Potential, a: BranchPoint, b: BranchPoint, *, leaving: bool = False) -> None:
+        self.potential, self.a, self.b, self.leaving = potential, a, b, leaving
         self.length = b.sigma - a.sigma
         self._known = {0.0: a, 1.0: b}
         self._folds: dict[str, list[tuple[float, Located]]] = {}
@@ -94,6 +102,8 @@ class Segment:
 
     def _folds_at(self, kind: str) -> list[tuple[float, Located]]:
         """The folds of a kind with their shares of the segment, located once."""
+        if self.leaving:
+            return []
         if kind not in self._folds:
             quantity = FOLDS[kind]
             shares = self._brackets(quantity)
@@ -171,6 +181,14 @@ class Segment:
         return mirrored and rests_flat(self.potential)
 
 
+def crosses(segment: Segment) -> bool:
+    """Whether the determinant of K changes its sign, or keeps it, against the number of limit points: then another branch crosses."""
+    if segment.leaving:
+        return False
+    turns = len(segment.folds("limit_point"))
+    return (parity(segment.a) * parity(segment.b) < 0) != (turns % 2 == 1)
+
+
 def branch_point(segment: Segment) -> Located | None:
     """The point where another branch crosses: the bordered matrix of the arc-length system is singular, though no quantity turns.
 
@@ -187,7 +205,10 @@ def branch_point(segment: Segment) -> Located | None:
         except SolveError:  # next to the crossing the equations are all but singular: what is known is the bracket
             break
         low, high = (middle, high) if sign == signs[0] else (low, middle)
-    point = segment.at(low)
+    point, a, b = segment.at(low), segment.a, segment.b
+    # at the crossing itself the equations have two tangents; that of this branch is known from its points on both sides
+    tangent, pressure = ((1 - low) * u + low * v for u, v in ((a.tangent, b.tangent), (a.tangent_pressure, b.tangent_pressure)))
+    point = unit_point(segment.potential, point.state, point.sigma, tangent, pressure)
     return Located("branch_point", point, (high - low) * segment.length + point.state.correction)
 
 

@@ -16,7 +16,7 @@ from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment, branch_point, crosses
 from .start import START_VOLUME, guess_at_volume, moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
-from .switching import Crossing, crossing_at, points_beyond, same_crossing
+from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing
 from .wellposed import ill_posed, is_slack
 
 #: volumes of the domes from which branches and deflated iterations set out; from other shapes than flat ones: beyond that at rest, in
@@ -263,8 +263,14 @@ def beyond_limit(
     for segment in follow(potential, start, max_steps):
         if ill_posed(potential, segment.b.state.evaluation) is not None:
             return Limit(fold, None, segment.b.state)
+        crossing = None if any_before else crossing_on(potential, segment)
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
+            # a branch that ends on another one turns back there: what is met is the other one
+            if crossing is not None and (fold is None or crossing.point.sigma - fold.point.sigma <= SAME_CROSSING * segment.length):
+                fold = crossing
+                if (landing := beyond_crossing(potential, crossing, quantity, load, stable, max_steps)) is not None:
+                    return Limit(crossing, landing)
         for met in segment.crossings(quantity, load):
             before = fold is None or met.sigma < fold.point.sigma
             if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
@@ -272,3 +278,39 @@ def beyond_limit(
         if abs(segment.b.state.volume) > FAR:
             break
     return Limit(fold, None)
+
+
+def beyond_crossing(
+    potential: Potential, located: Located, quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
+) -> State | None:
+    """The first stable state at a load on the other branch at a branch point; None where neither half has one."""
+    try:
+        crossing = crossing_at(potential, located.point)
+    except SolveError:
+        return None
+    for direction in (1, -1):
+        for segment in follow_beyond(potential, crossing, direction, max_steps):
+            if ill_posed(potential, segment.b.state.evaluation) is not None:
+                break
+            with suppress(SolveError):
+                for met in segment.crossings(quantity, load):
+                    if stable(met.state):
+                        return met.state
+            if abs(segment.b.state.volume) > FAR:
+                break
+    return None
+
+
+def loss_before(
+    potential: Potential, state: State, quantity: str, stable: Callable[[State], bool], *, max_steps: int = 300
+) -> Located | None:
+    """Where the branch through an unstable state was stable last: the branch point or fold on the way back, None if there is none."""
+    kind = next(k for k, q in FOLDS.items() if q == quantity)
+    here = state.volume - potential.space.reference_volume
+    for direction in (-1, 1) if here > 0 else (1, -1):
+        for segment in follow(potential, first_point(potential, state, direction), max_steps):
+            if ill_posed(potential, segment.b.state.evaluation) is not None or abs(segment.b.state.volume) > FAR:
+                break
+            if stable(segment.b.state):
+                return crossing_on(potential, segment) or next(iter(segment.folds(kind)), None)
+    return None

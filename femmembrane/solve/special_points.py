@@ -205,11 +205,12 @@ def branch_point(segment: Segment) -> Located | None:
         except SolveError:  # next to the crossing the equations are all but singular: what is known is the bracket
             break
         low, high = (middle, high) if sign == signs[0] else (low, middle)
-    point, a, b = segment.at(low), segment.a, segment.b
+    point, beyond, a, b = segment.at(low), segment.at(high), segment.a, segment.b
+    spread = max(abs(segment.value(q, point) - segment.value(q, beyond)) / (1 + abs(segment.value(q, point))) for q in FOLDS.values())
     # at the crossing itself the equations have two tangents; that of this branch is known from its points on both sides
     tangent, pressure = ((1 - low) * u + low * v for u, v in ((a.tangent, b.tangent), (a.tangent_pressure, b.tangent_pressure)))
     point = unit_point(segment.potential, point.state, point.sigma, tangent, pressure)
-    return Located("branch_point", point, (high - low) * segment.length + point.state.correction)
+    return Located("branch_point", point, max((high - low) * segment.length, spread) + point.state.correction)
 
 
 def _bordered_sign(point: BranchPoint) -> int:

@@ -42,6 +42,7 @@ class Search:
     max_steps: int
     states: list[State] = field(default_factory=list)
     traced: list[tuple[float, float]] = field(default_factory=list)
+    beyond: list[tuple[float, float]] = field(default_factory=list)
     iterations: int = 0
     deflations: int = 0
     ill_posed: list[State] = field(default_factory=list)
@@ -51,7 +52,7 @@ class Search:
 
     @property
     def followed(self) -> int:
-        """Number of branch points whose other branch was followed."""
+        """Number of branch points whose other branch was followed: the first ones."""
         return min(len(self.crossings), MOST_CROSSINGS)
 
     @property
@@ -83,7 +84,7 @@ class Search:
             crossing, direction = self._halves.pop(0)
             volumes = self._walk(follow_beyond(self.potential, crossing, direction, self.max_steps))
             if volumes:
-                self.traced.append((min(volumes), max(volumes)))
+                self.beyond.append((min(volumes), max(volumes)))
 
     def _walk(self, segments: Iterator[Segment]) -> list[float]:
         """Keep what a branch meets, as far as it is new; the volumes of its points."""
@@ -145,6 +146,8 @@ class Search:
         control = CONTROLS[self.quantity](self.load)
         guesses = [(guess_at_volume(self.potential, v), 0.0 if self.quantity == "volume" else self.load) for v in self.starts]
         guesses += [(scale * s.x, s.pressure) for s in self.states for scale in (0.7, 1.3, -1.0)]
+        # where a small asymmetry breaks a pitchfork no branch crosses, and the images of what is met are not connected to it
+        guesses += [(x, s.pressure) for s in self.states for x in self.potential.space.mirrored(s.x)]
         for x, pressure in guesses:
             self.deflations += 1
             state = self._deflated_newton(control, x, pressure)

@@ -37,8 +37,8 @@ from .state import Path, State, distance, inner
 SYMMETRIC = 1e-4
 #: difference of the states for derivatives, relative to the size of the membrane: the cube root of round-off
 _DIFFERENCE = 6e-6
-#: inverse iterations for the null vector: at a crossing the first one finds it
-_ITERATIONS = 4
+#: inverse iterations for the softest displacement: at a crossing the first one finds it
+_ITERATIONS = 6
 #: how often the first step off the known branch is halved
 _HALVINGS = 12
 #: a rate of the volume this small beside the terms that cancel in it is none
@@ -89,7 +89,7 @@ def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
         When the second derivatives do not single out another branch: more than two cross, or the two touch.
     """
     state = known.state
-    null = _null_vector(potential, known)
+    null = unit_point(potential, state, known.sigma, softest(potential, state), 0.0)
     rest = _across_null(potential, null)
     (a, size_a), (b, size_b), (c, size_c) = (_second(potential, null, *pair) for pair in ((rest, rest), (rest, null), (null, null)))
     pitchfork = abs(c) <= SYMMETRIC * size_c
@@ -154,16 +154,18 @@ def same_crossing(potential: Potential, a: State, b: State) -> bool:
     return distance(potential, a.x, b.x) <= SAME_CROSSING * distance(potential, a.x, np.zeros_like(a.x))
 
 
-def _null_vector(potential: Potential, known: BranchPoint) -> BranchPoint:
-    """(phi, 0) with K phi = 0 and V' . phi = 0, by inverse iteration."""
-    state, kd = known.state, potential.space.half_bandwidth
-    border = state.evaluation.volume_gradient
+def softest(potential: Potential, state: State) -> Array:
+    """The displacement at constant volume against which a state is softest, by inverse iteration; the largest entry is 1 in size.
+
+    At a branch point it is phi, with K phi = 0 and V' . phi = 0.
+    """
+    border, kd = state.evaluation.volume_gradient, potential.space.half_bandwidth
     bordered = BorderedFactor(state.factor, border, border, 0.0)
     phi = np.random.default_rng(0).standard_normal(state.x.size)
     for _ in range(_ITERATIONS):
         phi, _ = bordered.solve(band_product(potential.mass, kd, phi), 0.0)
         phi = phi / np.abs(phi).max()
-    return unit_point(potential, state, known.sigma, phi, 0.0)
+    return phi
 
 
 def _across_null(potential: Potential, null: BranchPoint) -> BranchPoint:

@@ -419,8 +419,10 @@ def _special_points(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple
     numbers = zip(*(dataset[prefix + name].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
     states = _equilibria(dataset, scene, prefix + "equilibrium_")
     # younger than the format, and only where there are branch points
-    known = np.array(dataset[prefix + "tangent"].values, dtype=np.float64) if prefix + "tangent" in dataset else []
-    tangents = [t if np.isfinite(t).all() else None for t in known] or [None] * len(kinds)
+    tangents: list[Array | None] = [None] * len(kinds)
+    if prefix + "tangent" in dataset:
+        rows = np.array(dataset[prefix + "tangent"].values, dtype=np.float64)
+        tangents = [row if np.isfinite(row).all() else None for row in rows]
     return tuple(
         SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, tangent=t)
         for k, n, e, t in zip(kinds, numbers, states, tangents, strict=True)

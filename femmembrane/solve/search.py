@@ -13,7 +13,7 @@ from ..potential import Array, Potential
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
 from .controls import Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, Equations, correct, relative_size
-from .special_points import FOLDS, Located, Segment, branch_point, crosses
+from .special_points import FOLDS, Located, Segment, branch_points
 from .start import START_VOLUME, guess_at_volume, moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
 from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing
@@ -100,21 +100,26 @@ class Search:
         return volumes
 
     def _meets_known_branch(self, segment: Segment) -> bool:
-        """Note the branch point on a segment; whether the branch comes in there on a half of the other one, which is known then."""
-        located = crossing_on(self.potential, segment)
-        if located is None:
-            return False
-        for crossing in self.crossings:
-            if same_crossing(self.potential, crossing.known.state, located.point.state):
-                side = crossing.side(self.potential, segment.a)
-                self._halves = [(c, d) for c, d in self._halves if c is not crossing or d != side]
-                return side != 0
+        """Note the branch points on a segment; whether the branch comes in there on a half of the other one, which is known then."""
+        for located in crossings_on(self.potential, segment):
+            for crossing in self.crossings:
+                if same_crossing(self.potential, crossing.known.state, located.point.state):
+                    side = crossing.side(self.potential, segment.a)
+                    self._halves = [(c, d) for c, d in self._halves if c is not crossing or d != side]
+                    if side:
+                        return True
+                    break
+            else:
+                self._remember(located)
+        return False
+
+    def _remember(self, located: Located) -> None:
+        """Keep a branch point; both halves of the other branch are to be followed."""
         with suppress(SolveError):
             crossing = crossing_at(self.potential, located.point)
             self.crossings.append(crossing)
             if len(self.crossings) <= MOST_CROSSINGS:
                 self._halves += [(crossing, 1), (crossing, -1)]
-        return False
 
     def _on_traced_branch(self, state: State) -> bool:
         """Whether a state lies between two traced points of nearly the same shape: a start on a known branch is not traced again."""
@@ -211,13 +216,13 @@ def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_
         point = new
 
 
-def crossing_on(potential: Potential, segment: Segment) -> Located | None:
-    """The branch point on a segment, None where there is none, it cannot be located, or the states are folded shapes of the mesh."""
+def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
+    """The branch points on a segment that can be located, but for those of folded shapes of the mesh."""
     try:
-        located = branch_point(segment) if crosses(segment) else None
+        located = branch_points(segment)
     except SolveError:
-        return None
-    return located if located is not None and ill_posed(potential, located.point.state.evaluation) is None else None
+        return []
+    return [found for found in located if ill_posed(potential, found.point.state.evaluation) is None]
 
 
 @dataclass(slots=True)
@@ -266,7 +271,7 @@ def beyond_limit(
     for segment in follow(potential, start, max_steps):
         if ill_posed(potential, segment.b.state.evaluation) is not None:
             return Limit(fold, None, segment.b.state)
-        crossing = None if any_before else crossing_on(potential, segment)
+        crossing = None if any_before else next(iter(crossings_on(potential, segment)), None)
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
             # a branch that ends on another one turns back there: what is met is the other one
@@ -315,5 +320,5 @@ def loss_before(
             if ill_posed(potential, segment.b.state.evaluation) is not None or abs(segment.b.state.volume) > FAR:
                 break
             if stable(segment.b.state):
-                return crossing_on(potential, segment) or next(iter(segment.folds(kind)), None)
+                return next(iter([*crossings_on(potential, segment)[-1:], *segment.folds(kind)]), None)
     return None

@@ -15,10 +15,12 @@ from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
 from ..potential import Potential
+from .banded import negative_directions
 from .continuation import BranchPoint, tangent_at, unit_point
 from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, correct
 from .state import State, flat_state, hermite, rests_flat
+from .wellposed import ill_posed
 
 #: the folds looked for: their name and the quantity that is stationary
 FOLDS = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "center_height"}
@@ -181,12 +183,36 @@ class Segment:
         return mirrored and rests_flat(self.potential)
 
 
-def crosses(segment: Segment) -> bool:
-    """Whether the determinant of K changes its sign, or keeps it, against the number of limit points: then another branch crosses."""
+def crossings(segment: Segment) -> int:
+    """The least number of other branches that cross on a segment.
+
+    A limit point changes the number of negative eigenvalues of K by one, and so does a crossing. Where the equations are ill-posed the
+    number is that of the mesh's own short waves, and no more than its parity is looked at.
+    """
     if segment.leaving:
-        return False
-    turns = len(segment.folds("limit_point"))
-    return (parity(segment.a) * parity(segment.b) < 0) != (turns % 2 == 1)
+        return 0
+    before, after = (_negative(segment.potential, point) for point in (segment.a, segment.b))
+    surplus = abs(after - before) - len(segment.folds("limit_point"))
+    if any(ill_posed(segment.potential, point.state.evaluation) for point in (segment.a, segment.b)):
+        return surplus % 2
+    return surplus if surplus > 0 else surplus % 2
+
+
+def branch_points(segment: Segment, depth: int = 12) -> list[Located]:
+    """The points of a segment where other branches cross, as many as could be located; several are told apart by halving the segment.
+
+    Raises
+    ------
+    SolveError
+        When a point of the segment could not be resolved.
+    """
+    number = crossings(segment)
+    if number < 2 or not depth:
+        found = branch_point(segment) if number % 2 else None
+        return [] if found is None else [found]
+    middle = segment.at(0.5)
+    halves = Segment(segment.potential, segment.a, middle), Segment(segment.potential, middle, segment.b)
+    return [point for half in halves for point in branch_points(half, depth - 1)]
 
 
 def branch_point(segment: Segment) -> Located | None:
@@ -208,7 +234,8 @@ def branch_point(segment: Segment) -> Located | None:
     point, beyond, a, b = segment.at(low), segment.at(high), segment.a, segment.b
     spread = max(abs(segment.value(q, point) - segment.value(q, beyond)) / (1 + abs(segment.value(q, point))) for q in FOLDS.values())
     # at the crossing itself the equations have two tangents; that of this branch is known from its points on both sides
-    tangent, pressure = ((1 - low) * u + low * v for u, v in ((a.tangent, b.tangent), (a.tangent_pressure, b.tangent_pressure)))
+    tangent = (1 - low) * a.tangent + low * b.tangent
+    pressure = (1 - low) * a.tangent_pressure + low * b.tangent_pressure
     point = unit_point(segment.potential, point.state, point.sigma, tangent, pressure)
     return Located("branch_point", point, max((high - low) * segment.length, spread) + point.state.correction)
 
@@ -217,9 +244,9 @@ def _bordered_sign(point: BranchPoint) -> int:
     """Sign of det [K, -V'; tangent^T, tangent_P] = det K (tangent_P + tangent^T K^-1 V')."""
     evaluation = point.state.evaluation
     solved = point.state.factor.solve(evaluation.volume_gradient)
-    return parity(point) * (1 if point.tangent_pressure + point.dual @ solved > 0 else -1)
+    return point.state.factor.determinant_sign() * (1 if point.tangent_pressure + point.dual @ solved > 0 else -1)
 
 
-def parity(point: BranchPoint) -> int:
-    """Sign of det K: flips at every point where an odd number of eigenvalues of K changes sign."""
-    return point.state.factor.determinant_sign()
+def _negative(potential: Potential, point: BranchPoint) -> int:
+    """Number of negative eigenvalues of K."""
+    return negative_directions(point.state.evaluation.band, potential.space.half_bandwidth)

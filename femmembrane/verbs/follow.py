@@ -28,7 +28,7 @@ from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
 from .arguments import check_height, check_scene
 from .meshing import on_chosen_mesh
-from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
+from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
 from .trace import resume_trace, trace
 
 _SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
@@ -279,8 +279,7 @@ class _Turn:
         fold = self.limit.fold
         if fold is None:
             return None
-        eq = record(scene.replace(analysis=type(scene.analysis)()), potential, fold.point.state)
-        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq)
+        return special_point(scene.replace(analysis=type(scene.analysis)()), potential, fold)
 
     @property
     def status(self) -> Status | None:
@@ -294,7 +293,9 @@ class _Turn:
             return "the branch could not be followed there, and no fold was found where it would turn back"
         at = fold.point.state
         if fold.kind == "branch_point":
-            where = f"from the branch point P = {at.pressure:.9g}, V = {at.volume:.9g} on the branch holds no minimum; another one crosses it there"
+            where = (
+                f"the branch lost stability at the branch point P = {at.pressure:.9g}, V = {at.volume:.9g}, where another one crosses it"
+            )
             if landing is None:
                 return f"{where}, on which no stable state was met at this load"
             return f"{where}, on which the membrane would go to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"

@@ -14,7 +14,7 @@ from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
 from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
-from ..solve.special_points import FOLDS, Located, Segment, branch_point, crosses
+from ..solve.special_points import FOLDS, Located, Segment, branch_points, crossings
 from ..solve.start import moderate, start_at_volume
 from ..solve.state import Path, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
@@ -22,7 +22,7 @@ from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
-from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
+from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
 
 #: distance to a source at which the membrane counts as touching it
 CONTACT = 1e-3
@@ -125,7 +125,7 @@ def _on_mesh(
     max_steps: int,
     steps: StepControl | None,
     ill_posed: str,
-) -> tuple[Scene, float | Equilibrium | Branch | None, dict[str, float]]:
+) -> tuple[Scene, float | Equilibrium | SpecialPoint | Branch | None, dict[str, float]]:
     """The scene with a mesh, the start on it and the seconds that took; a branch that is continued keeps the mesh chosen for it."""
     kept = start.equilibrium.scene if isinstance(start, SpecialPoint) else start.scene if isinstance(start, Branch) else None
     if kept is not None and scene.open and getattr(kept.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
@@ -387,21 +387,24 @@ class _Tracing:
         """Keep the special points before the end of the trace; the branch point at which it set out, if it comes back to that."""
         clock, closing = time.perf_counter(), None
         located = [fold for kind in FOLDS for fold in segment.folds(kind)]
-        if crosses(segment):
-            found = branch_point(segment)
-            if found is None:
+        if number := crossings(segment):
+            crossed = branch_points(segment)
+            if len(crossed) < number:
                 a, b = segment.a.state, segment.b.state
                 self.unexplained.append(f"the inertia changes between V = {a.volume:.6g} and {b.volume:.6g} without a located point")
-            else:
-                located.append(found)
-                if self.crossing is not None and (last is None or found.point.sigma <= last.sigma):
-                    back = same_crossing(self.potential, self.crossing.known.state, found.point.state)
-                    closing = found.point if back else None
+            located += crossed
+            closing = next((found.point for found in crossed if self._back(found.point, last)), None)
         for fold in sorted(located, key=lambda f: f.point.sigma):
             if last is None or fold.point.sigma <= last.sigma:
                 self.special.append(self._special(fold))  # type: ignore[union-attr]
         self.timings["special_points"] += time.perf_counter() - clock
         return closing
+
+    def _back(self, point: BranchPoint, last: BranchPoint | None) -> bool:
+        """Whether a branch point before the end of the trace is the one at which it set out."""
+        if self.crossing is None or (last is not None and last.sigma < point.sigma):
+            return False
+        return same_crossing(self.potential, self.crossing.known.state, point.state)
 
     def _look_for_onsets(self, segment: Segment, end: BranchPoint) -> None:
         """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
@@ -419,9 +422,7 @@ class _Tracing:
                 self.timings["special_points"] += time.perf_counter() - clock
 
     def _special(self, fold: Located, azimuthal: int = 0) -> SpecialPoint:
-        eq = record(self.scene, self.potential, fold.point.state)
-        tangent = np.append(fold.point.tangent, fold.point.tangent_pressure) if fold.kind == "branch_point" else None
-        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq, azimuthal=azimuthal, tangent=tangent)
+        return special_point(self.scene, self.potential, fold, azimuthal)
 
     def _contact(self, point: BranchPoint) -> bool:
         return self.potential.distance_to_sources(point.state.x) < CONTACT

@@ -137,7 +137,11 @@ class Segment:
         return self._root(kind, function, low, high)[1]
 
     def _root(self, kind: str, function: Callable[[BranchPoint], float], low: float, high: float) -> tuple[float, Located]:
-        share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+        try:
+            share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+        except SolveError:  # another branch crosses at the fold, as where a branch of pears ends on that of the spheres
+            low, high = self.narrowed(function, low, high)
+            return low, Located(kind, self.at(low), (high - low) * self.length + self.spread(low, high))
         point = self.at(share)
         h = 1e-3 * (high - low)
         near = self.at(share + h if share + h < high else share - h)
@@ -145,6 +149,24 @@ class Segment:
         offset = abs(function(point) / slope) + point.state.correction
         moved = max(abs(point.rate(q, self.potential)) * offset / (1 + abs(self.value(q, point))) for q in FOLDS.values())
         return share, Located(kind, point, float(moved + point.state.correction))
+
+    def narrowed(self, function: Callable[[BranchPoint], float], low: float, high: float) -> tuple[float, float]:
+        """The shares between which a function of the point changes sign, by bisection as far as points can be resolved."""
+        sign = function(self.at(low)) > 0
+        while high - low > 1e-9:
+            middle = (low + high) / 2
+            try:
+                same = (function(self.at(middle)) > 0) == sign
+            except SolveError:  # next to a crossing the equations are all but singular: what is known is the bracket
+                break
+            low, high = (middle, high) if same else (low, middle)
+        return low, high
+
+    def spread(self, low: float, high: float) -> float:
+        """How far two points are apart, relative to 1 + size, in volume, pressure and pole height, with the errors of both."""
+        a, b = self.at(low), self.at(high)
+        apart = max(abs(self.value(q, a) - self.value(q, b)) / (1 + abs(self.value(q, a))) for q in FOLDS.values())
+        return float(apart + a.state.correction + b.state.correction)
 
     def crossings(self, quantity: str, value: float) -> list[BranchPoint]:
         """The points at which a quantity takes a value, in order, each corrected under that control; the first end does not count.
@@ -220,24 +242,15 @@ def branch_point(segment: Segment) -> Located | None:
 
     Bisection on the sign of its determinant, which a fold does not change; None when that sign does not change either.
     """
-    low, high = 0.0, 1.0
-    signs = [_bordered_sign(segment.at(s)) for s in (low, high)]
-    if signs[0] * signs[1] > 0:
+    if _bordered_sign(segment.a) * _bordered_sign(segment.b) > 0:
         return None
-    while high - low > 1e-9:
-        middle = (low + high) / 2
-        try:
-            sign = _bordered_sign(segment.at(middle))
-        except SolveError:  # next to the crossing the equations are all but singular: what is known is the bracket
-            break
-        low, high = (middle, high) if sign == signs[0] else (low, middle)
-    point, beyond, a, b = segment.at(low), segment.at(high), segment.a, segment.b
-    spread = max(abs(segment.value(q, point) - segment.value(q, beyond)) / (1 + abs(segment.value(q, point))) for q in FOLDS.values())
+    low, high = segment.narrowed(_bordered_sign, 0.0, 1.0)
+    point, a, b = segment.at(low), segment.a, segment.b
     # at the crossing itself the equations have two tangents; that of this branch is known from its points on both sides
     tangent = (1 - low) * a.tangent + low * b.tangent
     pressure = (1 - low) * a.tangent_pressure + low * b.tangent_pressure
     point = unit_point(segment.potential, point.state, point.sigma, tangent, pressure)
-    return Located("branch_point", point, max((high - low) * segment.length, spread) + point.state.correction)
+    return Located("branch_point", point, (high - low) * segment.length + segment.spread(low, high))
 
 
 def _bordered_sign(point: BranchPoint) -> int:

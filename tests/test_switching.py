@@ -108,6 +108,8 @@ def test_a_switched_branch_is_kept_as_any_other(tmp_path) -> None:
     half.save(tmp_path / "half.nc")
     rest = fm.trace(sphere(), start=fm.load(tmp_path / "half.nc"), until={"volume": 40.0})
     assert [eq.pressure for eq in rest] == [eq.pressure for eq in whole]
+    loop = fm.trace(sphere(), start=first)
+    assert len(fm.trace(sphere(), start=fm.load(tmp_path / "half.nc"))) == len(loop)
     whole.save(tmp_path / "whole.nc")
     assert [eq.state.tobytes() for eq in fm.load(tmp_path / "whole.nc")] == [eq.state.tobytes() for eq in whole]
     fm.load(tmp_path / "whole.nc").plot(tmp_path / "whole.svg")

@@ -300,14 +300,15 @@ class TraceMemory(PathMemory):
 
 @dataclass(frozen=True, eq=False)
 class Jump:
-    """A snap of a run from one part of the branch to another.
+    """A snap of a run from one part of the branch to another, or to another branch.
 
     Attributes
     ----------
     index : int
         Position in the branch of the equilibrium landed on.
     limit : SpecialPoint or None
-        The fold at which the branch turned back before the load.
+        The fold at which the branch turned back before the load, or the branch point at which it lost its stability: from there another
+        branch leads to the landing.
     landing : Equilibrium
     """
 
@@ -331,7 +332,7 @@ class Branch(Sequence[Equilibrium]):
     special_points : tuple of SpecialPoint, or None when none were looked for
     memory : TraceMemory for a branch traced by arc length, PathMemory for an unfinished run by loads, else None
     jumps : tuple of Jump
-        Where a run snapped because the branch turned back before a load.
+        Where a run snapped because the branch turned back before a load, or lost its stability at a branch point.
     solver : str
         Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     """

@@ -103,7 +103,7 @@ class Search:
         """Note the branch points on a segment; whether the branch comes in there on a half of the other one, which is known then."""
         for located in crossings_on(self.potential, segment):
             for crossing in self.crossings:
-                if same_crossing(self.potential, crossing.known.state, located.point.state):
+                if same_crossing(self.potential, crossing.known.state.x, located.point.state.x):
                     side = crossing.side(self.potential, segment.a)
                     self._halves = [(c, d) for c, d in self._halves if c is not crossing or d != side]
                     if side:
@@ -220,7 +220,7 @@ def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
     """The branch points on a segment that can be located, but for those of folded shapes of the mesh."""
     try:
         located = branch_points(segment)
-    except SolveError:
+    except SolveError:  # of a limit point on the segment
         return []
     return [found for found in located if ill_posed(potential, found.point.state.evaluation) is None]
 

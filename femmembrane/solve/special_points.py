@@ -205,7 +205,7 @@ class Segment:
         return mirrored and rests_flat(self.potential)
 
 
-def crossings(segment: Segment) -> int:
+def branches_crossing(segment: Segment) -> int:
     """The least number of other branches that cross on a segment.
 
     A limit point changes the number of negative eigenvalues of K by one, and so does a crossing. Where the equations are ill-posed the
@@ -221,18 +221,15 @@ def crossings(segment: Segment) -> int:
 
 
 def branch_points(segment: Segment, depth: int = 12) -> list[Located]:
-    """The points of a segment where other branches cross, as many as could be located; several are told apart by halving the segment.
-
-    Raises
-    ------
-    SolveError
-        When a point of the segment could not be resolved.
-    """
-    number = crossings(segment)
+    """The points of a segment where other branches cross, as many as could be located; several are told apart by halving the segment."""
+    number = branches_crossing(segment)
     if number < 2 or not depth:
         found = branch_point(segment) if number % 2 else None
         return [] if found is None else [found]
-    middle = segment.at(0.5)
+    try:
+        middle = segment.at(0.5)
+    except SolveError:
+        return []
     halves = Segment(segment.potential, segment.a, middle), Segment(segment.potential, middle, segment.b)
     return [point for half in halves for point in branch_points(half, depth - 1)]
 

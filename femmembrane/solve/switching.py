@@ -149,9 +149,9 @@ def points_beyond(potential: Potential, crossing: Crossing, direction: int, trac
     yield from trace_points(potential, new, tracer)
 
 
-def same_crossing(potential: Potential, a: State, b: State) -> bool:
-    """Whether two located branch points are one."""
-    return distance(potential, a.x, b.x) <= SAME_CROSSING * distance(potential, a.x, np.zeros_like(a.x))
+def same_crossing(potential: Potential, a: Array, b: Array) -> bool:
+    """Whether two located branch points, by their displacements, are one."""
+    return distance(potential, a, b) <= SAME_CROSSING * distance(potential, a, np.zeros_like(a))
 
 
 def softest(potential: Potential, state: State) -> Array:

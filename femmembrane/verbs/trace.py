@@ -14,7 +14,7 @@ from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
 from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
-from ..solve.special_points import FOLDS, Located, Segment, branch_points, crossings
+from ..solve.special_points import FOLDS, Located, Segment, branch_points, branches_crossing
 from ..solve.start import moderate, start_at_volume
 from ..solve.state import Path, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
@@ -387,7 +387,7 @@ class _Tracing:
         """Keep the special points before the end of the trace; the branch point at which it set out, if it comes back to that."""
         clock, closing = time.perf_counter(), None
         located = [fold for kind in FOLDS for fold in segment.folds(kind)]
-        if number := crossings(segment):
+        if number := branches_crossing(segment):
             crossed = branch_points(segment)
             if len(crossed) < number:
                 a, b = segment.a.state, segment.b.state
@@ -402,9 +402,9 @@ class _Tracing:
 
     def _back(self, point: BranchPoint, last: BranchPoint | None) -> bool:
         """Whether a branch point before the end of the trace is the one at which it set out."""
-        if self.crossing is None or (last is not None and last.sigma < point.sigma):
+        if len(self.found) < 3 or (last is not None and last.sigma < point.sigma):
             return False
-        return same_crossing(self.potential, self.crossing.known.state, point.state)
+        return same_crossing(self.potential, self.found[0].state, point.state.x)
 
     def _look_for_onsets(self, segment: Segment, end: BranchPoint) -> None:
         """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""

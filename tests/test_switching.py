@@ -287,3 +287,16 @@ def test_a_first_segment_looks_for_nothing_at_its_crossing() -> None:
     segment = Segment(potential, crossing.half(1), leave(potential, crossing, 1, 0.02), leaving=True)
     found: list[Located] = [fold for kind in ("limit_point", "volume_fold", "height_fold") for fold in segment.folds(kind)]
     assert found == []
+
+
+def test_all_states_of_a_sphere_with_a_small_hole() -> None:
+    """A cap 40 times as high as its rim is wide is nearly a sphere of radius 20.0125: its pears differ in energy, and no branch crosses.
+
+    The energies of the closed sphere are 38.50491 and 38.66432 times the square of the radius at 40 times its cube.
+    """
+    radius = (40.0**2 + 1) / 80
+    found = fm.equilibria(fm.Scene(material=TRELOAR, mesh=fm.cap(40.0, 24), degree=3), volume=40 * radius**3, max_steps=40)
+    assert [eq.verdict("volume").word for eq in found] == ["stable", "stable", "unstable"]
+    scaled = [energy / radius**2 for energy in found.energies]
+    assert scaled == pytest.approx([38.50491, 38.50491, 38.66432], rel=2e-3)
+    assert scaled[0] < 38.50491 + 0.01 < scaled[1] + 0.01

@@ -16,7 +16,7 @@ from .newton import TOLERANCE, Equations, correct, relative_size
 from .special_points import FOLDS, Located, Segment, branch_points
 from .start import START_VOLUME, guess_at_volume, moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
-from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing
+from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest
 from .wellposed import ill_posed, is_slack
 
 #: volumes of the domes from which branches and deflated iterations set out; from other shapes than flat ones: beyond that at rest, in
@@ -26,6 +26,8 @@ STARTS = (0.5, -0.5, 5.0, -5.0, 50.0, -50.0)
 SAME = 1e-6
 #: volume beyond which a branch is no longer followed
 FAR = 1e4
+#: stiffness of one displacement over that of all others below which states are looked for along it, and how far, relative to the size
+SOFT, KICKS = 0.2, (-0.3, 0.3)
 #: most branch points at which the other branch is followed
 MOST_CROSSINGS = 24
 
@@ -151,14 +153,25 @@ class Search:
         control = CONTROLS[self.quantity](self.load)
         guesses = [(guess_at_volume(self.potential, v), 0.0 if self.quantity == "volume" else self.load) for v in self.starts]
         guesses += [(scale * s.x, s.pressure) for s in self.states for scale in (0.7, 1.3, -1.0)]
-        # where a small asymmetry breaks a pitchfork no branch crosses, and the images of what is met are not connected to it
-        guesses += [(x, s.pressure) for s in self.states for x in self.potential.space.mirrored(s.x)]
+        guesses += [(x, s.pressure) for s in self.states for x in self._partners(s)]
         for x, pressure in guesses:
             self.deflations += 1
             state = self._deflated_newton(control, x, pressure)
             if state is not None and not self._known(state.x):
                 return state
         return None
+
+    def _partners(self, state: State) -> list[Array]:
+        """Guesses for states that would be connected to one if the scene had a symmetry that it lacks: where a small asymmetry breaks a
+        pitchfork no branch crosses, and one half of the other branch is on its own. They are its mirror image and, where one displacement
+        lowers the energy or meets far less resistance than all others, the shapes on both sides along it.
+        """
+        phi, stiffness = softest(self.potential, state)
+        shapes = self.potential.space.mirrored(state.x)
+        if stiffness < SOFT:
+            size = float(np.abs(state.x).max())
+            shapes += [state.x + k * size * phi for k in KICKS]
+        return shapes
 
     def _deflated_newton(self, control: Control, x: Array, pressure: float, iterations: int = 40) -> State | None:
         potential = self.potential
@@ -218,6 +231,8 @@ def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_
 
 def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
     """The branch points on a segment that can be located, but for those of folded shapes of the mesh."""
+    if all(ill_posed(potential, point.state.evaluation) for point in (segment.a, segment.b)):
+        return []
     try:
         located = branch_points(segment)
     except SolveError:  # of a limit point on the segment

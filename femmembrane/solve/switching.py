@@ -27,7 +27,7 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Potential
-from .banded import BorderedFactor, band_product
+from .banded import BorderedFactor, band_inner, band_product
 from .continuation import BranchPoint, Tracer, tangent_at, trace_points, unit_point
 from .controls import ArcLengthControl
 from .newton import TOLERANCE, correct
@@ -89,7 +89,7 @@ def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
         When the second derivatives do not single out another branch: more than two cross, or the two touch.
     """
     state = known.state
-    null = unit_point(potential, state, known.sigma, softest(potential, state), 0.0)
+    null = unit_point(potential, state, known.sigma, softest(potential, state)[0], 0.0)
     rest = _across_null(potential, null)
     (a, size_a), (b, size_b), (c, size_c) = (_second(potential, null, *pair) for pair in ((rest, rest), (rest, null), (null, null)))
     pitchfork = abs(c) <= SYMMETRIC * size_c
@@ -154,18 +154,25 @@ def same_crossing(potential: Potential, a: Array, b: Array) -> bool:
     return distance(potential, a, b) <= SAME_CROSSING * distance(potential, a, np.zeros_like(a))
 
 
-def softest(potential: Potential, state: State) -> Array:
-    """The displacement at constant volume against which a state is softest, by inverse iteration; the largest entry is 1 in size.
+def softest(potential: Potential, state: State) -> tuple[Array, float]:
+    """The displacement at constant volume against which a state is softest, and its stiffness, signed, over the size of
+    that of the next one.
 
-    At a branch point it is phi, with K phi = 0 and V' . phi = 0.
+    At a branch point it is phi, with K phi = 0 and V' . phi = 0, and the stiffness 0. Inverse iteration on two vectors.
     """
-    border, kd = state.evaluation.volume_gradient, potential.space.half_bandwidth
+    border, kd, mass = state.evaluation.volume_gradient, potential.space.half_bandwidth, potential.mass
     bordered = BorderedFactor(state.factor, border, border, 0.0)
-    phi = np.random.default_rng(0).standard_normal(state.x.size)
+    pair = list(np.random.default_rng(0).standard_normal((2, state.x.size)))
     for _ in range(_ITERATIONS):
-        phi, _ = bordered.solve(band_product(potential.mass, kd, phi), 0.0)
-        phi = phi / np.abs(phi).max()
-    return phi
+        pair = [bordered.solve(band_product(mass, kd, v), 0.0)[0] for v in pair]
+        pair[0] = pair[0] / math.sqrt(band_inner(mass, kd, pair[0], pair[0]))
+        pair[1] = pair[1] - band_inner(mass, kd, pair[0], pair[1]) * pair[0]
+        pair[1] = pair[1] / math.sqrt(band_inner(mass, kd, pair[1], pair[1]))
+    projected = [[band_inner(state.evaluation.band, kd, u, v) for v in pair] for u in pair]
+    stiffness, combinations = np.linalg.eigh(np.array(projected))
+    first = int(np.argmin(np.abs(stiffness)))
+    phi = combinations[0, first] * pair[0] + combinations[1, first] * pair[1]
+    return phi / np.abs(phi).max(), float(stiffness[first] / np.abs(stiffness).max())
 
 
 def _across_null(potential: Potential, null: BranchPoint) -> BranchPoint:

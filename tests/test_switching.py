@@ -101,19 +101,15 @@ def test_from_the_pear_back_to_the_sphere() -> None:
 
 
 def test_a_switched_branch_is_kept_as_any_other(tmp_path) -> None:
+    """Its start comes back from a file, and so does half of it, to be continued to the last bit and to the end of the loop."""
     round_balloon().save(tmp_path / "round.nc")
     first = branch_points(fm.load(tmp_path / "round.nc"))[0]
-    whole = fm.trace(sphere(), start=first, until={"volume": 40.0})
-    half = fm.trace(sphere(), start=first, until={"volume": 40.0}, max_steps=5)
-    half.save(tmp_path / "half.nc")
-    rest = fm.trace(sphere(), start=fm.load(tmp_path / "half.nc"), until={"volume": 40.0})
-    assert [eq.pressure for eq in rest] == [eq.pressure for eq in whole]
-    loop = fm.trace(sphere(), start=first)
-    assert len(fm.trace(sphere(), start=fm.load(tmp_path / "half.nc"))) == len(loop)
-    whole.save(tmp_path / "whole.nc")
-    assert [eq.state.tobytes() for eq in fm.load(tmp_path / "whole.nc")] == [eq.state.tobytes() for eq in whole]
-    fm.load(tmp_path / "whole.nc").plot(tmp_path / "whole.svg")
-    assert (tmp_path / "whole.svg").stat().st_size > 1000
+    whole = fm.trace(sphere(), start=first)
+    fm.trace(sphere(), start=first, max_steps=5).save(tmp_path / "half.nc")
+    rest = fm.trace(sphere(), start=fm.load(tmp_path / "half.nc"))
+    assert [eq.state.tobytes() for eq in rest] == [eq.state.tobytes() for eq in whole]
+    assert (rest.status, rest.message) == (whole.status, whole.message)
+    assert rest.plot().axes
 
 
 @cache

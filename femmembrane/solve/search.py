@@ -29,7 +29,7 @@ FAR = 1e4
 #: stiffness of one displacement over that of all others below which states are looked for along it, and how far, relative to the size
 SOFT, KICKS = 0.2, (-0.3, 0.3)
 #: most branch points at which the other branch is followed
-MOST_CROSSINGS = 24
+MOST_CROSSINGS = 16
 
 CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl}
 
@@ -166,11 +166,12 @@ class Search:
         pitchfork no branch crosses, and one half of the other branch is on its own. They are its mirror image and, where one displacement
         lowers the energy or meets far less resistance than all others, the shapes on both sides along it.
         """
-        phi, stiffness = softest(self.potential, state)
         shapes = self.potential.space.mirrored(state.x)
-        if stiffness < SOFT:
-            size = float(np.abs(state.x).max())
-            shapes += [state.x + k * size * phi for k in KICKS]
+        with suppress(SolveError):
+            phi, stiffness = softest(self.potential, state)
+            if stiffness < SOFT:
+                size = float(np.abs(state.x).max())
+                shapes += [state.x + k * size * phi for k in KICKS]
         return shapes
 
     def _deflated_newton(self, control: Control, x: Array, pressure: float, iterations: int = 40) -> State | None:
@@ -291,6 +292,9 @@ def beyond_limit(
             fold = next(iter(segment.folds(kind)), None)
             # a branch that ends on another one turns back there: what is met is the other one
             if crossing is not None and (fold is None or crossing.point.sigma - fold.point.sigma <= SAME_CROSSING * segment.length):
+                for met in segment.crossings(quantity, load):
+                    if met.sigma < crossing.point.sigma and stable(met.state):
+                        return Limit(None, met.state)
                 fold = crossing
                 if (landing := beyond_crossing(potential, crossing, quantity, load, stable, max_steps)) is not None:
                     return Limit(crossing, landing)

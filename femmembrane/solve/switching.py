@@ -159,20 +159,28 @@ def softest(potential: Potential, state: State) -> tuple[Array, float]:
     that of the next one.
 
     At a branch point it is phi, with K phi = 0 and V' . phi = 0, and the stiffness 0. Inverse iteration on two vectors.
+
+    Raises
+    ------
+    SolveError
+        Where the membrane has no stiffness at all.
     """
     border, kd, mass = state.evaluation.volume_gradient, potential.space.half_bandwidth, potential.mass
-    bordered = BorderedFactor(state.factor, border, border, 0.0)
     pair = list(np.random.default_rng(0).standard_normal((2, state.x.size)))
-    for _ in range(_ITERATIONS):
-        pair = [bordered.solve(band_product(mass, kd, v), 0.0)[0] for v in pair]
-        pair[0] = pair[0] / math.sqrt(band_inner(mass, kd, pair[0], pair[0]))
-        pair[1] = pair[1] - band_inner(mass, kd, pair[0], pair[1]) * pair[0]
-        pair[1] = pair[1] / math.sqrt(band_inner(mass, kd, pair[1], pair[1]))
-    projected = [[band_inner(state.evaluation.band, kd, u, v) for v in pair] for u in pair]
-    stiffness, combinations = np.linalg.eigh(np.array(projected))
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # nothing resists in the flat membrane at rest
+        bordered = BorderedFactor(state.factor, border, border, 0.0)
+        for _ in range(_ITERATIONS):
+            pair = [bordered.solve(band_product(mass, kd, v), 0.0)[0] for v in pair]
+            pair[0] = pair[0] / np.sqrt(band_inner(mass, kd, pair[0], pair[0]))
+            pair[1] = pair[1] - band_inner(mass, kd, pair[0], pair[1]) * pair[0]
+            pair[1] = pair[1] / np.sqrt(band_inner(mass, kd, pair[1], pair[1]))
+        projected = np.array([[band_inner(state.evaluation.band, kd, u, v) for v in pair] for u in pair])
+    if not np.isfinite(projected).all():
+        raise SolveError("no displacement is the softest one there", status=Status.NOT_CONVERGED)
+    stiffness, combinations = np.linalg.eigh(projected)
     first = int(np.argmin(np.abs(stiffness)))
     phi = combinations[0, first] * pair[0] + combinations[1, first] * pair[1]
-    return phi / np.abs(phi).max(), float(stiffness[first] / np.abs(stiffness).max())
+    return phi / np.abs(phi).max(), float(stiffness[first] / (np.abs(stiffness).max() or 1.0))
 
 
 def _across_null(potential: Potential, null: BranchPoint) -> BranchPoint:

@@ -27,6 +27,7 @@ class Status(StrEnum):
     UNEXPLAINED_INERTIA = "unexplained change of inertia"
     ACCURACY_NOT_MET = "accuracy not met"
     INTERRUPTED = "interrupted"
+    CLOSED = "closed branch"
 
     @property
     def advice(self) -> str:
@@ -42,13 +43,14 @@ _ADVICE = {
     Status.CONVERGED: "residual and constraint were recomputed and are at round-off",
     Status.NOT_CONVERGED: "start nearer (smaller load steps, or start= an equilibrium close by)",
     Status.STEP_UNDERFLOW: "no step beyond this point converges; where the branch turns back in the load, fm.trace follows it round",
-    Status.NO_EQUILIBRIUM: "start from a neighbour (start= an equilibrium close by), or follow a branch by arc length (fm.trace) to see which loads it passes",
+    Status.NO_EQUILIBRIUM: "start from a neighbour (start= an equilibrium close by), or see by arc length (fm.trace) which loads a branch passes",
     Status.DIPOLE_CONTACT: "the membrane runs into a source, where the energy has no lower bound; lower the strength or the load",
     Status.NOT_A_MINIMUM: 'forces balance there, but a minimiser cannot hold it; solver="newton" accepts such states',
     Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",
     Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",
     Status.ACCURACY_NOT_MET: "ask for less (mesh.accuracy), or give mesh.elements and mesh.degree",
     Status.INTERRUPTED: "what was computed is kept; continue from there",
+    Status.CLOSED: "the branch came back to the branch point where it set out: going on would trace it once more",
     Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh; "
     "a tension field (effects.tension_field = true) wrinkles instead",
     Status.SLACK: "the tension field ends here: where no tension is left along the meridian the membrane folds onto itself; "

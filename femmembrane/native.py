@@ -1,8 +1,8 @@
 """The compiled half, if there is one.
 
 The extension module ``femmembrane._native`` (sources in ``compiled/``) does what the package does in NumPy: point functions, assembly, band
-factors and eigenvalue iterations, with the same formulas. It knows no scene, and decides nothing. It is built on installation where a C compiler
-is found; without it, or with ``FEMMEMBRANE_COMPILED=0`` in the environment, everything runs in NumPy and gives the same answers to
+factors and eigenvalue iterations, with the same formulas. It knows no scene, and decides nothing. It is built on installation where a C
+compiler is found; without it, or with ``FEMMEMBRANE_COMPILED=0`` in the environment, everything runs in NumPy and gives the same answers to
 round-off.
 """
 

@@ -147,7 +147,8 @@ class Run:
     solver : {"ipopt", "newton"}
         Who solves under volume and pressure control; a height and arc length always take the bordered Newton corrector.
     at_limit : {"stop", "jump"}
-        Under volume and pressure control, where the branch turns back before a load: end there, or snap to the next stable state.
+        Under volume and pressure control, where the branch turns back before a load, or loses its stability at a branch point: end there,
+        or snap to the next stable state.
 
     Raises
     ------

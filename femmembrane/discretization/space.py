@@ -28,6 +28,8 @@ from .supports import as_support, floats, free_rotations
 #: pairs (i, j) of the local variables (u, u_x, w, w_x) in the order of Hessian entries
 HESSIAN_PAIRS: tuple[tuple[int, int], ...] = tuple(combinations_with_replacement(range(4), 2))
 
+#: deviation of a mesh from its mirror image, relative to its size, that counts as none
+_MIRRORED = 1e-6
 #: highest degree at which slopes are recovered from the Gauss points
 _RECOVERED = 3
 
@@ -335,6 +337,16 @@ class Space:
             w = w - self._at_pin(w)
         x[self.gather] = np.concatenate([inverse @ u, inverse @ w])
         return x[: self.n_free]
+
+    def mirrored(self, x: Array) -> list[Array]:
+        """Coefficients of the mirror image across the middle of the meridian, in a list; none where the mesh is not its own image."""
+        s = self.interpolation_points()
+        R, Z = self.mesh.position(s)
+        low, size = float(Z.min() + Z.max()), float(max(np.ptp(R), np.ptp(Z)))
+        if np.abs(R - R[::-1, ::-1]).max() > _MIRRORED * size or np.abs(Z + Z[::-1, ::-1] - low).max() > _MIRRORED * size:
+            return []
+        u, _, w, _ = (values.reshape(s.shape)[::-1, ::-1] for values in self.evaluate(x, s.ravel()))
+        return [self.interpolate(u, -w)]
 
     def _at_pin(self, w: Array) -> float:
         """What the interpolant of values at the interpolation points is at the node that is held along the axis."""

@@ -248,6 +248,8 @@ class SpecialPoint:
     equilibrium : Equilibrium
     azimuthal : int
         For an azimuthal onset: the number of waves against which stability is lost or regained there.
+    tangent : ndarray, shape (n_free + 1,), or None
+        For a branch point: the direction in (x, P) of the branch on which it was found, which tells it from the one that crosses there.
     """
 
     kind: str
@@ -257,6 +259,7 @@ class SpecialPoint:
     error: float
     equilibrium: Equilibrium = field(repr=False)
     azimuthal: int = field(default=0, kw_only=True)
+    tangent: Array | None = field(default=None, repr=False, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,14 +300,15 @@ class TraceMemory(PathMemory):
 
 @dataclass(frozen=True, eq=False)
 class Jump:
-    """A snap of a run from one part of the branch to another.
+    """A snap of a run from one part of the branch to another, or to another branch.
 
     Attributes
     ----------
     index : int
         Position in the branch of the equilibrium landed on.
     limit : SpecialPoint or None
-        The fold at which the branch turned back before the load.
+        The fold at which the branch turned back before the load, or the branch point at which it lost its stability: from there another
+        branch leads to the landing.
     landing : Equilibrium
     """
 
@@ -328,7 +332,7 @@ class Branch(Sequence[Equilibrium]):
     special_points : tuple of SpecialPoint, or None when none were looked for
     memory : TraceMemory for a branch traced by arc length, PathMemory for an unfinished run by loads, else None
     jumps : tuple of Jump
-        Where a run snapped because the branch turned back before a load.
+        Where a run snapped because the branch turned back before a load, or lost its stability at a branch point.
     solver : str
         Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     """

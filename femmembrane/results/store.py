@@ -65,6 +65,7 @@ MEANING: Mapping[str, tuple[str, str]] = {
     **{f"{name}_pa": (stress, "Pa") for name, stress in _STRESSES.items()},
     "kind": ("kind of the special point", "1"),
     "error": ("uncertainty of the special point's location", "1"),
+    "tangent": ("direction of the branch on which it was found, in the unknowns and the pressure", "1"),
     "azimuthal": ("number of waves around the axis of the instability that sets in", "1"),
     "trace_sigma": ("arc length, or load, at the last points of the path", "1"),
     "trace_point": ("state and pressure at the last points of the path", "1"),
@@ -308,7 +309,12 @@ def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) 
     dimension = prefix + "point"
     numbers = {prefix + name: ((dimension,), _array(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
     kinds: dict[str, _Variable] = {prefix + "kind": ((dimension,), _array("kind", (str(p.kind) for p in points)))}
-    return {**kinds, **numbers, **_equilibrium_variables([p.equilibrium for p in points], width, dimension, prefix + "equilibrium_")}
+    tangents: dict[str, _Variable] = {}
+    if any(p.tangent is not None for p in points):
+        none = np.full(width + 1, np.nan)
+        tangents[prefix + "tangent"] = (dimension, "unknown"), np.array([none if p.tangent is None else p.tangent for p in points])
+    states = _equilibrium_variables([p.equilibrium for p in points], width, dimension, prefix + "equilibrium_")
+    return {**kinds, **numbers, **tangents, **states}
 
 
 def _array(name: str, values: Iterable[Any]) -> NDArray[Any]:
@@ -412,9 +418,14 @@ def _special_points(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple
     kinds = [str(k) for k in dataset[prefix + "kind"].values]
     numbers = zip(*(dataset[prefix + name].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
     states = _equilibria(dataset, scene, prefix + "equilibrium_")
+    # younger than the format, and only where there are branch points
+    tangents: list[Array | None] = [None] * len(kinds)
+    if prefix + "tangent" in dataset:
+        rows = np.array(dataset[prefix + "tangent"].values, dtype=np.float64)
+        tangents = [row if np.isfinite(row).all() else None for row in rows]
     return tuple(
-        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e)
-        for k, n, e in zip(kinds, numbers, states, strict=True)
+        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, tangent=t)
+        for k, n, e, t in zip(kinds, numbers, states, tangents, strict=True)
     )
 
 

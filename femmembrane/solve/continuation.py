@@ -19,7 +19,6 @@ from .controls import ArcLengthControl
 from .newton import correct
 from .state import Path, State, inner
 
-
 #: smallest step relative to the arc length so far
 ROUND_OFF = 1e-14
 
@@ -79,7 +78,7 @@ def first_point(potential: Potential, state: State, direction: int) -> BranchPoi
     """The point of a state with its tangent, oriented towards larger volume for direction +1."""
     border = state.evaluation.volume_gradient
     tangent, tp = BorderedFactor(state.factor, -border, border, 0.0).solve(np.zeros_like(state.x), 1.0)
-    return _normalised(potential, state, 0.0, direction * tangent, direction * tp)
+    return unit_point(potential, state, 0.0, direction * tangent, direction * tp)
 
 
 def trace_points(potential: Potential, point: BranchPoint, tracer: Tracer) -> Iterator[BranchPoint]:
@@ -125,7 +124,7 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     if potential.passed_source(point.state.x, state.x):
         return None, result.iterations, 0.5
     # the border of this control is the tangent before: the corrector's last factors give the new one for a back-substitution
-    new = _normalised(potential, state, point.sigma, *result.bordered.solve(np.zeros_like(state.x), 1.0)) if result.bordered else None
+    new = unit_point(potential, state, point.sigma, *result.bordered.solve(np.zeros_like(state.x), 1.0)) if result.bordered else None
     if new is None:
         return None, result.iterations, 0.5
     cosine = float(point.dual @ new.tangent + point.dual_pressure * new.tangent_pressure)
@@ -148,10 +147,11 @@ def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> Br
     """Unit tangent at a state, oriented like that of a neighbouring point."""
     bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, neighbour.dual, neighbour.dual_pressure)
     tangent, tp = bordered.solve(np.zeros_like(state.x), 1.0)
-    return _normalised(potential, state, neighbour.sigma, tangent, tp)
+    return unit_point(potential, state, neighbour.sigma, tangent, tp)
 
 
-def _normalised(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
+def unit_point(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
+    """The point of a state whose tangent is known up to its length."""
     dual, dual_pressure = _dual(potential, tangent, tp)
     size = math.sqrt(tangent @ dual + tp * dual_pressure)
     # not the dual over the size, which differs in the last bit: a resumed trace knows the unit tangent alone

@@ -166,7 +166,11 @@ def _correct(system: FoldSystem, z: Array, borders: Borders, row: Array, *, turn
             dx, rest = jacobian.solve(-equations.force, [-equations.g, -float(row @ (z - guess))])
         except np.linalg.LinAlgError:
             return None
-        size = max(relative_size(system.family, dx, z[:-2]), abs(rest[0]) / (system.family.space.units["pressure"] + abs(z[-2])), abs(rest[1]) / max(system.scale, abs(z[-1])))
+        size = max(
+            relative_size(system.family, dx, z[:-2]),
+            abs(rest[0]) / (system.family.space.units["pressure"] + abs(z[-2])),
+            abs(rest[1]) / max(system.scale, abs(z[-1])),
+        )
         if size <= TOLERANCE:
             tangent, dual = _tangent(system, jacobian, row if turn_from is None else turn_from)
             residual = relative_residual(system.family, equations.force, equations.evaluation, float(z[-2]))

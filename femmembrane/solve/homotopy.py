@@ -13,6 +13,7 @@ the guess; that it arrives at an equilibrium does not, for the last point is sol
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -188,7 +189,7 @@ class _Path:
         share = (1 - a.z[-1]) / (b.z[-1] - a.z[-1]) if b.z[-1] != a.z[-1] else 1.0
         z = a.z + share * (b.z - a.z)
         result = self.family.solve(z[:-2], float(z[-2]))
-        reach = self._length((b.z - a.z) * np.append(np.ones(len(z) - 1), 0.0))
+        reach = self._length(np.append((b.z - a.z)[:-1], 0.0))
         moved = distance(self.potential, result.x, z[:-2]) / self._size
         if result.status is not Status.CONVERGED or moved > reach + 1e-9:
             return None
@@ -220,4 +221,4 @@ class _Path:
         return np.concatenate([weighed / (potential.area * (potential.space.unit * self._size) ** 2), [0.0, z[-1]]])
 
     def _length(self, z: Array) -> float:
-        return float(np.sqrt(max(self._dual(z) @ z, 0.0)))
+        return math.sqrt(max(float(self._dual(z) @ z), 0.0))

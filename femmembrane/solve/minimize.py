@@ -21,6 +21,10 @@ from ..potential import Array, Evaluation, Potential, vectorise
 from .banded import negative_directions
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct
+from .state import distance
+
+#: two states closer than this are the same, relative to the size of the displacement
+SAME = 1e-6
 
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -150,10 +154,25 @@ def minimize_and_verify(
     if not (np.isfinite(found).all() and np.isfinite(p)):
         found, p = x, pressure
     result = correct(potential, control, found, p, magnetic=magnetic)
+    if result.status is Status.CONVERGED:
+        result = _on_branch_of_guess(potential, control, x, pressure, magnetic, result)
     result.iterations += iterations
     if result.status is Status.CONVERGED and not is_minimum(potential, control, result.evaluation):
         result.status = Status.NOT_A_MINIMUM
     return result
+
+
+def _on_branch_of_guess(
+    potential: Potential, control: Control, x: Array, pressure: float, magnetic: float, found: NewtonResult
+) -> NewtonResult:
+    """The minimiser's state, or the one that Newton's method finds from the guess where that is another and nearer one.
+
+    Where its branch is unstable a minimiser goes downhill to another one, or stays on it: round-off and the mesh decide which.
+    """
+    own = correct(potential, control, x, pressure, magnetic=magnetic)
+    if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * distance(potential, found.x, np.zeros_like(x)):
+        return found
+    return own if distance(potential, own.x, x) < distance(potential, found.x, x) else found
 
 
 def is_minimum(potential: Potential, control: Control, evaluation: Evaluation) -> bool:

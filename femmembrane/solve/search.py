@@ -12,11 +12,12 @@ from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
 from .controls import Control, PressureControl, VolumeControl
-from .newton import TOLERANCE, Equations, correct, relative_size
-from .special_points import FOLDS, Located, Segment
 from .guess import guess_at_volume
+from .newton import TOLERANCE, Equations, correct, relative_size
+from .special_points import FOLDS, Located, Segment, branch_points
 from .start import moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
+from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest
 from .wellposed import ill_posed, is_slack
 
 #: volumes from which branches and deflated iterations set out: beyond that at rest, in units of what a moderately inflated membrane holds
@@ -26,6 +27,10 @@ STARTS = (1.0, -1.0, 10.0, -10.0, 100.0, -100.0)
 SAME = 1e-6
 #: a branch is no longer followed beyond this many times what a moderately inflated membrane holds more than at rest
 FAR = 2e4
+#: stiffness of one displacement over that of all others below which states are looked for along it, and how far, relative to the size
+SOFT, KICKS = 0.2, (-0.3, 0.3)
+#: most branch points at which the other branch is followed
+MOST_CROSSINGS = 16
 
 CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl}
 
@@ -40,10 +45,18 @@ class Search:
     max_steps: int
     states: list[State] = field(default_factory=list)
     traced: list[tuple[float, float]] = field(default_factory=list)
+    beyond: list[tuple[float, float]] = field(default_factory=list)
     iterations: int = 0
     deflations: int = 0
     ill_posed: list[State] = field(default_factory=list)
+    crossings: list[Crossing] = field(default_factory=list)
     _points: list[BranchPoint] = field(default_factory=list)
+    _halves: list[tuple[Crossing, int]] = field(default_factory=list)
+
+    @property
+    def followed(self) -> int:
+        """Number of branch points whose other branch was followed: the first ones."""
+        return min(len(self.crossings), MOST_CROSSINGS)
 
     @property
     def starts(self) -> list[float]:
@@ -68,19 +81,53 @@ class Search:
     def _trace_both_ways(self, state: State) -> None:
         volumes = [state.volume]
         for direction in (1, -1):
-            for segment in follow(self.potential, first_point(self.potential, state, direction), self.max_steps):
-                self._points.append(segment.b)
-                volumes.append(segment.b.state.volume)
-                with suppress(SolveError):  # through the flat unloaded state there is no path
-                    for point in segment.crossings(self.quantity, self.load):
-                        self._add(point.state)
-                if abs(volumes[-1]) > FAR * moderate(self.potential):
-                    break
+            volumes += self._walk(follow(self.potential, first_point(self.potential, state, direction), self.max_steps))
         self.traced.append((min(volumes), max(volumes)))
+        while self._halves:
+            crossing, direction = self._halves.pop(0)
+            volumes = self._walk(follow_beyond(self.potential, crossing, direction, self.max_steps))
+            if volumes:
+                self.beyond.append((min(volumes), max(volumes)))
+
+    def _walk(self, segments: Iterator[Segment]) -> list[float]:
+        """Keep what a branch meets, as far as it is new; the volumes of its points."""
+        volumes = []
+        for segment in segments:
+            self._points.append(segment.b)
+            volumes.append(segment.b.state.volume)
+            with suppress(SolveError):  # through the flat unloaded state there is no path
+                for point in segment.crossings(self.quantity, self.load):
+                    self._add(point.state)
+            if self._meets_known_branch(segment) or abs(volumes[-1]) > FAR * moderate(self.potential):
+                break
+        return volumes
+
+    def _meets_known_branch(self, segment: Segment) -> bool:
+        """Note the branch points on a segment; whether the branch comes in there on a half of the other one, which is known then."""
+        for located in crossings_on(self.potential, segment):
+            for crossing in self.crossings:
+                if same_crossing(self.potential, crossing.known.state.x, located.point.state.x):
+                    side = crossing.side(self.potential, segment.a)
+                    self._halves = [(c, d) for c, d in self._halves if c is not crossing or d != side]
+                    if side:
+                        return True
+                    break
+            else:
+                self._remember(located)
+        return False
+
+    def _remember(self, located: Located) -> None:
+        """Keep a branch point; both halves of the other branch are to be followed."""
+        with suppress(SolveError):
+            crossing = crossing_at(self.potential, located.point)
+            self.crossings.append(crossing)
+            if len(self.crossings) <= MOST_CROSSINGS:
+                self._halves += [(crossing, 1), (crossing, -1)]
 
     def _on_traced_branch(self, state: State) -> bool:
         """Whether a state lies between two traced points of nearly the same shape: a start on a known branch is not traced again."""
-        near = [p for p in self._points if abs(p.state.volume - state.volume) < 0.5 * (self.potential.space.units["volume"] + abs(state.volume))]
+        reach = 0.5 * (self.potential.space.units["volume"] + abs(state.volume))
+        near = [p for p in self._points if abs(p.state.volume - state.volume) < reach]
         scale = distance(self.potential, state.x, np.zeros_like(state.x))
         for p in near:
             result = correct(self.potential, VolumeControl(state.volume), p.state.x, p.state.pressure)
@@ -108,12 +155,26 @@ class Search:
         control = CONTROLS[self.quantity](self.load)
         guesses = [(guess_at_volume(self.potential, v), 0.0 if self.quantity == "volume" else self.load) for v in self.starts]
         guesses += [(scale * s.x, s.pressure) for s in self.states for scale in (0.7, 1.3, -1.0)]
+        guesses += [(x, s.pressure) for s in self.states for x in self._partners(s)]
         for x, pressure in guesses:
             self.deflations += 1
             state = self._deflated_newton(control, x, pressure)
             if state is not None and not self._known(state.x):
                 return state
         return None
+
+    def _partners(self, state: State) -> list[Array]:
+        """Guesses for states that would be connected to one if the scene had a symmetry that it lacks: where a small asymmetry breaks a
+        pitchfork no branch crosses, and one half of the other branch is on its own. They are its mirror image and, where one displacement
+        lowers the energy or meets far less resistance than all others, the shapes on both sides along it.
+        """
+        shapes = self.potential.space.mirrored(state.x)
+        with suppress(SolveError):
+            phi, stiffness = softest(self.potential, state)
+            if stiffness < SOFT:
+                size = float(np.abs(state.x).max())
+                shapes += [state.x + k * size * phi for k in KICKS]
+        return shapes
 
     def _deflated_newton(self, control: Control, x: Array, pressure: float, iterations: int = 40) -> State | None:
         potential = self.potential
@@ -156,11 +217,39 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
         point = new
 
 
+def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_steps: int) -> Iterator[Segment]:
+    """As :func:`follow`, on a half of the branch that crosses at a branch point."""
+    tracer = Tracer(Path(), StepControl().first, StepControl())
+    points, point = points_beyond(potential, crossing, direction, tracer), crossing.half(direction)
+    for k in range(max_steps):
+        try:
+            new = next(points)
+        except SolveError:
+            return
+        yield Segment(potential, point, new, leaving=k == 0)
+        if is_slack(potential, new.state):
+            return
+        point = new
+
+
+def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
+    """The branch points on a segment that can be located, but for those of folded shapes of the mesh."""
+    if all(ill_posed(potential, point.state.evaluation) for point in (segment.a, segment.b)):
+        return []
+    try:
+        located = branch_points(segment)
+    except SolveError:  # of a limit point on the segment
+        return []
+    return [found for found in located if ill_posed(potential, found.point.state.evaluation) is None]
+
+
 @dataclass(slots=True)
 class Limit:
-    """Why a load cannot be reached: the fold where the branch turns back, and the next stable state at the load, if there is one.
+    """Why a load cannot be reached: the fold where the branch turns back, or the branch point from which on it is unstable, and the next
+    stable state at the load, if there is one.
 
-    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became so, slack or compressed, before either was met: what follows is the mesh's.
+    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became so, slack or compressed,
+    before either was met: what follows is the mesh's.
     """
 
     fold: Located | None
@@ -204,8 +293,17 @@ def beyond_limit(
         if ill_posed(potential, segment.b.state.evaluation) is not None:
             return Limit(fold, None, segment.b.state, last)
         last = segment.b.state
+        crossing = None if any_before else next(iter(crossings_on(potential, segment)), None)
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
+            # a branch that ends on another one turns back there: what is met is the other one
+            if crossing is not None and (fold is None or crossing.point.sigma - fold.point.sigma <= SAME_CROSSING * segment.length):
+                for met in segment.crossings(quantity, load):
+                    if met.sigma < crossing.point.sigma and stable(met.state):
+                        return Limit(None, met.state)
+                fold = crossing
+                if (landing := beyond_crossing(potential, crossing, quantity, load, stable, max_steps)) is not None:
+                    return Limit(crossing, landing)
         for met in segment.crossings(quantity, load):
             before = fold is None or met.sigma < fold.point.sigma
             if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
@@ -213,3 +311,39 @@ def beyond_limit(
         if abs(segment.b.state.volume) > FAR * moderate(potential):
             break
     return Limit(fold, None, last=last)
+
+
+def beyond_crossing(
+    potential: Potential, located: Located, quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
+) -> State | None:
+    """The first stable state at a load on the other branch at a branch point; None where neither half has one."""
+    try:
+        crossing = crossing_at(potential, located.point)
+    except SolveError:
+        return None
+    for direction in (1, -1):
+        for segment in follow_beyond(potential, crossing, direction, max_steps):
+            if ill_posed(potential, segment.b.state.evaluation) is not None:
+                break
+            with suppress(SolveError):
+                for met in segment.crossings(quantity, load):
+                    if stable(met.state):
+                        return met.state
+            if abs(segment.b.state.volume) > FAR * moderate(potential):
+                break
+    return None
+
+
+def loss_before(
+    potential: Potential, state: State, quantity: str, stable: Callable[[State], bool], *, max_steps: int = 300
+) -> Located | None:
+    """Where the branch through an unstable state was stable last: the branch point or fold on the way back, None if there is none."""
+    kind = next(k for k, q in FOLDS.items() if q == quantity)
+    here = state.volume - potential.space.reference_volume
+    for direction in (-1, 1) if here > 0 else (1, -1):
+        for segment in follow(potential, first_point(potential, state, direction), max_steps):
+            if ill_posed(potential, segment.b.state.evaluation) is not None or abs(segment.b.state.volume) > FAR * moderate(potential):
+                break
+            if stable(segment.b.state):
+                return next(iter([*crossings_on(potential, segment)[-1:], *segment.folds(kind)]), None)
+    return None

@@ -15,10 +15,12 @@ from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
 from ..potential import Potential
-from .continuation import BranchPoint, tangent_at
+from .banded import negative_directions
+from .continuation import BranchPoint, tangent_at, unit_point
 from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
 from .newton import TOLERANCE, correct
 from .state import State, flat_state, hermite, rests_flat
+from .wellposed import ill_posed
 
 #: the folds looked for: their name and the quantity that is stationary
 FOLDS = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "center_height"}
@@ -47,10 +49,18 @@ class Located:
 
 
 class Segment:
-    """The branch between two neighbouring points."""
+    """The branch between two neighbouring points.
 
-    def __init__(self, potential: Potential, a: BranchPoint, b: BranchPoint) -> None:
-        self.potential, self.a, self.b = potential, a, b
+    Parameters
+    ----------
+    potential, a, b : Potential, BranchPoint, BranchPoint
+    leaving : bool
+        Whether the first point is a crossing at which the branch was entered: there its own rates and its inertia are round-off, so that
+        nothing is looked for before the second point but given values.
+    """
+
+    def __init__(self, potential: Potential, a: BranchPoint, b: BranchPoint, *, leaving: bool = False) -> None:
+        self.potential, self.a, self.b, self.leaving = potential, a, b, leaving
         self.length = b.sigma - a.sigma
         self._known = {0.0: a, 1.0: b}
         self._folds: dict[str, list[tuple[float, Located]]] = {}
@@ -95,6 +105,8 @@ class Segment:
 
     def _folds_at(self, kind: str) -> list[tuple[float, Located]]:
         """The folds of a kind with their shares of the segment, located once."""
+        if self.leaving:
+            return []
         if kind not in self._folds:
             quantity = FOLDS[kind]
             shares = self._brackets(quantity)
@@ -126,7 +138,11 @@ class Segment:
         return self._root(kind, function, low, high)[1]
 
     def _root(self, kind: str, function: Callable[[BranchPoint], float], low: float, high: float) -> tuple[float, Located]:
-        share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+        try:
+            share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+        except SolveError:  # another branch crosses at the fold, as where a branch of pears ends on that of the spheres
+            low, high = self.narrowed(function, low, high)
+            return low, Located(kind, self.at(low), (high - low) * self.length + self.spread(low, high))
         point = self.at(share)
         h = 1e-3 * (high - low)
         near = self.at(share + h if share + h < high else share - h)
@@ -136,6 +152,25 @@ class Segment:
         moved = max(abs(point.rate(q, self.potential)) * offset / (units[q] + abs(self.value(q, point))) for q in FOLDS.values())
         return share, Located(kind, point, float(moved + point.state.correction))
 
+    def narrowed(self, function: Callable[[BranchPoint], float], low: float, high: float) -> tuple[float, float]:
+        """The shares between which a function of the point changes sign, by bisection as far as points can be resolved."""
+        sign = function(self.at(low)) > 0
+        while high - low > 1e-9:
+            middle = (low + high) / 2
+            try:
+                same = (function(self.at(middle)) > 0) == sign
+            except SolveError:  # next to a crossing the equations are all but singular: what is known is the bracket
+                break
+            low, high = (middle, high) if same else (low, middle)
+        return low, high
+
+    def spread(self, low: float, high: float) -> float:
+        """How far two points are apart, relative to one unit and the size, in volume, pressure and pole height, with the errors of both."""
+        a, b = self.at(low), self.at(high)
+        units = self.potential.space.units
+        apart = max(abs(self.value(q, a) - self.value(q, b)) / (units[q] + abs(self.value(q, a))) for q in FOLDS.values())
+        return float(apart + a.state.correction + b.state.correction)
+
     def crossings(self, quantity: str, value: float) -> list[BranchPoint]:
         """The points at which a quantity takes a value, in order, each corrected under that control; the first end does not count.
 
@@ -144,7 +179,8 @@ class Segment:
         kind = next(k for k, q in FOLDS.items() if q == quantity)
         shares = [0.0, *(share for share, _ in self._folds_at(kind)), 1.0]
         ends = [self.value(quantity, self.at(s)) - value for s in shares]
-        ends = [ends[0], *(0.0 if abs(e) <= ON_FOLD * (self.potential.space.units[quantity] + abs(value)) else e for e in ends[1:-1]), ends[-1]]
+        least = ON_FOLD * (self.potential.space.units[quantity] + abs(value))
+        ends = [ends[0], *(0.0 if abs(e) <= least else e for e in ends[1:-1]), ends[-1]]
         return [
             self.at(high) if b == 0 and high != 1.0 else self._crossing(quantity, value, low, high)
             for low, high, a, b in zip(shares, shares[1:], ends, ends[1:], strict=False)
@@ -173,33 +209,60 @@ class Segment:
         return mirrored and rests_flat(self.potential)
 
 
+def branches_crossing(segment: Segment) -> int:
+    """The least number of other branches that cross on a segment.
+
+    A limit point changes the number of negative eigenvalues of K by one, and so does a crossing. Where the equations are ill-posed the
+    number is that of the mesh's own short waves, and no more than its parity is looked at.
+    """
+    if segment.leaving:
+        return 0
+    turns = len(segment.folds("limit_point"))
+    if any(ill_posed(segment.potential, point.state.evaluation) for point in (segment.a, segment.b)):
+        signs = [point.state.factor.determinant_sign() for point in (segment.a, segment.b)]
+        return int((signs[0] != signs[1]) != (turns % 2 == 1))
+    before, after = (_negative(segment.potential, point) for point in (segment.a, segment.b))
+    surplus = abs(after - before) - turns
+    return surplus if surplus > 0 else surplus % 2
+
+
+def branch_points(segment: Segment, depth: int = 12) -> list[Located]:
+    """The points of a segment where other branches cross, as many as could be located; several are told apart by halving the segment."""
+    number = branches_crossing(segment)
+    if number < 2 or not depth:
+        found = branch_point(segment) if number % 2 else None
+        return [] if found is None else [found]
+    try:
+        middle = segment.at(0.5)
+    except SolveError:
+        return []
+    halves = Segment(segment.potential, segment.a, middle), Segment(segment.potential, middle, segment.b)
+    return [point for half in halves for point in branch_points(half, depth - 1)]
+
+
 def branch_point(segment: Segment) -> Located | None:
     """The point where another branch crosses: the bordered matrix of the arc-length system is singular, though no quantity turns.
 
     Bisection on the sign of its determinant, which a fold does not change; None when that sign does not change either.
     """
-    low, high = 0.0, 1.0
-    signs = [_bordered_sign(segment.at(s)) for s in (low, high)]
-    if signs[0] * signs[1] > 0:
+    if _bordered_sign(segment.a) * _bordered_sign(segment.b) > 0:
         return None
-    while high - low > 1e-9:
-        middle = (low + high) / 2
-        try:
-            sign = _bordered_sign(segment.at(middle))
-        except SolveError:  # next to the crossing the equations are all but singular: what is known is the bracket
-            break
-        low, high = (middle, high) if sign == signs[0] else (low, middle)
-    point = segment.at(low)
-    return Located("branch_point", point, (high - low) * segment.length + point.state.correction)
+    low, high = segment.narrowed(_bordered_sign, 0.0, 1.0)
+    point, a, b = segment.at(low), segment.a, segment.b
+    # at the crossing itself the equations have two tangents; that of this branch is known from its points on both sides
+    tangent = (1 - low) * a.tangent + low * b.tangent
+    pressure = (1 - low) * a.tangent_pressure + low * b.tangent_pressure
+    point = unit_point(segment.potential, point.state, point.sigma, tangent, pressure)
+    return Located("branch_point", point, (high - low) * segment.length + segment.spread(low, high))
 
 
 def _bordered_sign(point: BranchPoint) -> int:
     """Sign of det [K, -V'; tangent^T, tangent_P] = det K (tangent_P + tangent^T K^-1 V')."""
     evaluation = point.state.evaluation
     solved = point.state.factor.solve(evaluation.volume_gradient)
-    return parity(point) * (1 if point.dual_pressure + point.dual @ solved > 0 else -1)
+    return point.state.factor.determinant_sign() * (1 if point.dual_pressure + point.dual @ solved > 0 else -1)
 
 
-def parity(point: BranchPoint) -> int:
-    """Sign of det K: flips at every point where an odd number of eigenvalues of K changes sign."""
-    return point.state.factor.determinant_sign()
+def _negative(potential: Potential, point: BranchPoint) -> int:
+    """Number of negative eigenvalues of K."""
+    return negative_directions(point.state.evaluation.band, potential.space.half_bandwidth)

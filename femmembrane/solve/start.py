@@ -347,7 +347,12 @@ def _ways_from(
 def _control(quantity: str | Gas, load: float) -> Control:
     if isinstance(quantity, Gas):
         return quantity
-    return {"volume": VolumeControl, "pressure": PressureControl, "center_height": CenterHeightControl}[quantity](load)
+    controls: dict[str, Callable[[float], Control]] = {
+        "volume": VolumeControl,
+        "pressure": PressureControl,
+        "center_height": CenterHeightControl,
+    }
+    return controls[quantity](load)
 
 
 def _along(
@@ -430,9 +435,8 @@ def _gas_met(segment: Segment, gas: Gas) -> Iterator[State]:
     held = [_amount(segment.potential, point, gas) - gas.amount for point in ends]
     if held[0] * held[1] > 0 or any(point.state.volume <= -gas.chamber for point in ends):
         return
-    a, b = ends
     share = held[0] / (held[0] - held[1])
-    near = segment.at(share) if 0 < share < 1 else b
+    near = segment.at(share) if 0 < share < 1 else segment.b
     result = correct(segment.potential, gas, near.state.x, near.state.pressure, damped=True)
     if result.status is Status.CONVERGED:
         yield State.of(result)
@@ -455,4 +459,3 @@ def _pull(potential: Potential) -> float:
     shallow = 1e-6 * potential.space.units["volume"]
     evaluation, dome = potential.evaluate(flat, 0.0), guess_at_volume(potential, shallow)
     return float(-(evaluation.gradient[across] @ dome[across]) / (evaluation.volume_gradient[across] @ dome[across]))
-

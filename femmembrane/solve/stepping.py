@@ -82,9 +82,10 @@ def march(
         result = corrector(potential, control_at(there), x, pressure, magnetic=factor_of(there))
         spent += result.iterations
         reach = distance(potential, x, accepted[-1].x)
-        if result.status is Status.CONVERGED and distance(potential, result.x, x) <= MAX_DEVIATION * reach + 1e-9 * max(
-            potential.largest(x)
-        ) / potential.space.unit:
+        if (
+            result.status is Status.CONVERGED
+            and distance(potential, result.x, x) <= MAX_DEVIATION * reach + 1e-9 * max(potential.largest(x)) / potential.space.unit
+        ):
             new = State.of(result, spent - result.iterations)
             if parameter == "load" and magnetic and potential.passed_source(accepted[-1].x, new.x):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"

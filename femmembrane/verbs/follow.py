@@ -19,7 +19,7 @@ from ..scene import Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
-from ..solve.search import Limit, beyond_limit
+from ..solve.search import Limit, beyond_crossing, beyond_limit, loss_before
 from ..solve.special_points import ON_FOLD
 from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume, start_in_gas
 from ..solve.state import Path, State, at_rest, distance, flat_state, rests_flat
@@ -28,7 +28,7 @@ from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
 from .arguments import check_height, check_scene
 from .meshing import on_chosen_mesh
-from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
+from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
 from .trace import resume_trace, trace
 
 _SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
@@ -71,8 +71,8 @@ def inflate(
     solver : {"ipopt", "newton"}
         Minimiser, or the bordered corrector (which also follows saddle points).
     at_limit : {"stop", "jump"}
-        Where the branch turns back before a load: end there, saying where the membrane would jump to, or go to the next stable state
-        that the branch has at that load, and on from it.
+        Where the branch turns back before a load, or becomes unstable at a branch point (``solver="ipopt"``): end there, saying where the
+        membrane would go, or go to the next stable state at that load, of this branch or of the one that crosses it, and on from there.
     throw : bool
         Raise when a volume cannot be reached; otherwise return what was reached, with its status and message.
     on_step : callable, optional
@@ -272,7 +272,7 @@ def _follow(
 
 @dataclass(frozen=True)
 class _Turn:
-    """The branch turned back before a load, and where it is met again."""
+    """The branch turned back before a load, or became unstable, and where a stable state is met again."""
 
     limit: Limit
 
@@ -280,14 +280,26 @@ class _Turn:
         fold = self.limit.fold
         if fold is None:
             return None
-        eq = record(scene.replace(analysis=type(scene.analysis)()), potential, fold.point.state)
-        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq)
+        return special_point(scene.replace(analysis=type(scene.analysis)()), potential, fold)
+
+    @property
+    def status(self) -> Status | None:
+        """Why the load was not reached; None where that was not found out."""
+        fold = self.limit.fold
+        return None if fold is None else Status.NOT_A_MINIMUM if fold.kind == "branch_point" else Status.NO_EQUILIBRIUM
 
     def __str__(self) -> str:
         fold, landing = self.limit.fold, self.limit.landing
         if fold is None:
             return "steps in the load did not converge there, and along the branch no fold in it was met"
         at = fold.point.state
+        if fold.kind == "branch_point":
+            where = (
+                f"the branch lost stability at the branch point P = {at.pressure:.9g}, V = {at.volume:.9g}, where another one crosses it"
+            )
+            if landing is None:
+                return f"{where}, on which no stable state was met at this load"
+            return f"{where}, on which the membrane would go to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
         what = fold.kind.replace("_", " ")
         where = f"the branch turns back: the {what} is P = {at.pressure:.9g}, V = {at.volume:.9g}"
         if landing is None:
@@ -330,7 +342,8 @@ class _Walk:
             raise failure
         self.load = rest + float(np.copysign(size, load - rest))
         try:
-            self.state, self.path = self._first(self.load), Path()
+            self.state, _ = self._first(self.load, False)
+            self.path = Path()
         except SolveError:
             raise failure from None
 
@@ -346,17 +359,18 @@ class _Walk:
         if self.state is None or self._flat(self.state.x):
             # the flat unloaded membrane has no stiffness that a path could leave it by
             try:
-                self.state, self.path = self._first(load), Path()
+                self.state, turn = self._first(load, jump)
+                self.path = Path()
             except SolveError as failure:
                 self._begin_before(load, failure)
                 return self.to(load, jump)
         elif load != self.load and self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
             return self._through_flat(self.state, load, jump)
         elif load != self.load and at_rest(self.potential, self.quantity, load):
-            self.state, self.path = flat_state(self.potential), Path()
+            self.state, self.path, turn = flat_state(self.potential), Path(), None
         else:
             return self._along(self.state, load, jump)
-        return self._arrived(self.state, load, None)
+        return self._arrived(self.state, load, turn)
 
     def _along(self, state: State, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """Along the branch from the state at hand, and off it where it turns back before the load."""
@@ -374,7 +388,7 @@ class _Walk:
             if turn.limit.fold is None and turn.limit.ill_posed is not None:
                 raise slackness(self.potential, turn.limit.ill_posed) from error
             if not jump or turn.limit.landing is None:
-                raise SolveError(str(turn), status=Status.NO_EQUILIBRIUM if turn.limit.fold else error.status) from error
+                raise SolveError(str(turn), status=turn.status or error.status) from error
             self.path = Path()
             return self._arrived(turn.limit.landing, load, turn)
         states[-1].iterations = sum(s.iterations for s in states)
@@ -412,7 +426,8 @@ class _Walk:
     def _flat(self, x: Array) -> bool:
         return not x.any() and rests_flat(self.potential)
 
-    def _first(self, load: float) -> State:
+    def _first(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
+        """The state of a cold start, and where its branch became unstable if it is one of another branch."""
         guess = self.cold(self.potential, load, self.corrector is not correct)
         result = self.corrector(self.potential, self.control_at(load), guess.x, guess.pressure)
         if (
@@ -420,25 +435,33 @@ class _Walk:
             and self.quantity == "pressure"
             and abs(guess.pressure - load) <= ON_FOLD * (self.potential.space.units["pressure"] + abs(load))
         ):
-            return guess  # a limit point at this very pressure, which no corrector finds under pressure control
+            return guess, None  # a limit point at this very pressure, which no corrector finds under pressure control
+        if result.status is Status.NOT_A_MINIMUM:
+            turn = self._lost(guess, load)
+            if jump and turn.limit.landing is not None:
+                return turn.limit.landing, turn
+            where = f"the state found there (V = {guess.volume:.6g}, P = {guess.pressure:.6g}) is no minimum under {self.quantity} control"
+            raise SolveError(f"{where}; {turn}" if turn.limit.fold else where, status=result.status)
         if result.status is not Status.CONVERGED:
             raise SolveError(f"the state found there has V = {guess.volume:.6g} and P = {guess.pressure:.6g}", status=result.status)
-        return State.of(result, guess.iterations)
+        return State.of(result, guess.iterations), None
+
+    def _lost(self, state: State, load: float) -> _Turn:
+        """Where the branch of an unstable state was stable last, and the stable state at the load on the branch that crosses there."""
+        lost = loss_before(self.potential, state, self.quantity, self._stable(load))
+        if lost is None or lost.kind != "branch_point":
+            return _Turn(Limit(None, None))
+        return _Turn(Limit(lost, beyond_crossing(self.potential, lost, self.quantity, load, self._stable(load))))
+
+    def _stable(self, load: float) -> Callable[[State], bool]:
+        control = self.control_at(load)
+        return lambda state: is_minimum(self.potential, control, state.evaluation)
 
     def _turn(self, error: SolveError, load: float) -> _Turn:
         last = error.result[-1] if error.result else self.state
         if self.quantity not in _MINIMISED or last is None:
             return _Turn(Limit(None, None))
-        control = self.control_at(load)
-        limit = beyond_limit(
-            self.potential,
-            last,
-            self.quantity,
-            load,
-            lambda s: is_minimum(self.potential, control, s.evaluation),
-            any_before=self.corrector is correct,
-        )
-        return _Turn(limit)
+        return _Turn(beyond_limit(self.potential, last, self.quantity, load, self._stable(load), any_before=self.corrector is correct))
 
 
 def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:

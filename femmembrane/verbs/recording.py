@@ -9,10 +9,11 @@ import numpy as np
 
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
-from ..results.records import Branch, Equilibrium, PathMemory
+from ..results.records import Branch, Equilibrium, PathMemory, SpecialPoint
 from ..scene import Scene
 from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import RESIDUAL, correct, relative_residual
+from ..solve.special_points import Located
 from ..solve.state import Path, State
 from ..solve.wellposed import ill_posed
 from ..stability.judge import judge
@@ -102,3 +103,10 @@ def record(
         gas=gas,
         _verdicts=verdicts,
     )
+
+
+def special_point(scene: Scene, potential: Potential, located: Located, azimuthal: int = 0) -> SpecialPoint:
+    """The public record of a located point; of a branch point with the direction of its branch, from which another can be told."""
+    point, eq = located.point, record(scene, potential, located.point.state)
+    tangent = np.append(point.tangent, point.tangent_pressure) if located.kind == "branch_point" else None
+    return SpecialPoint(located.kind, eq.volume, eq.pressure, eq.center_height, located.error, eq, azimuthal=azimuthal, tangent=tangent)

@@ -60,8 +60,9 @@ class Equilibria(Sequence[Equilibrium]):
 def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | None = None, max_steps: int = 400) -> Equilibria:
     """All equilibria at a pressure or at a volume that can be found, stable or not.
 
-    Branches through several inflated and deflated starts are traced both ways and cut at the load; Newton's method with the states found
-    deflated then looks for branches that are not connected to them.
+    Branches through several inflated and deflated starts are traced both ways and cut at the load, and so is the other branch at every
+    branch point met on the way, each once; Newton's method with the states found deflated then looks for branches that are not connected
+    to them.
 
     Parameters
     ----------
@@ -89,10 +90,19 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     found = [record(scene, potential, state) for state in search.states]
     energies = [eq.energy - eq.pressure * eq.volume * (control == "pressure") for eq in found]
     order = np.argsort(energies, kind="stable")
+    return Equilibria(control, float(load), tuple(found[k] for k in order), tuple(float(energies[k]) for k in order), _searched(search))
+
+
+def _searched(search: Search) -> str:
+    """What was done, in words."""
     spans = ", ".join(f"V = {low:.4g} to {high:.4g}" for low, high in search.traced)
-    searched = (
-        f"searched: {len(search.traced)} traced stretch(es) ({spans}), starts at V = {', '.join(f'{v:g}' for v in search.starts)}, "
-        f"{search.deflations} deflated solves ({search.iterations} iterations)"
-        + (f"; {len(search.ill_posed)} ill-posed state(s) left out, whose shape depends on the mesh" if search.ill_posed else "")
-    )
-    return Equilibria(control, float(load), tuple(found[k] for k in order), tuple(float(energies[k]) for k in order), searched)
+    parts = [f"{len(search.traced)} traced stretch(es) ({spans})", f"starts at V = {', '.join(f'{v:g}' for v in search.starts)}"]
+    if search.followed:
+        reach = [f(span) for f, span in ((min, [low for low, _ in search.beyond]), (max, [high for _, high in search.beyond])) if span]
+        where = " (V = {:.4g} to {:.4g})".format(*reach) if reach else ""
+        parts.append(f"{search.followed} branch point(s) at which the other branch was followed{where}")
+    if left := len(search.crossings) - search.followed:
+        parts.append(f"{left} more at which it was not")
+    parts.append(f"{search.deflations} deflated solves ({search.iterations} iterations)")
+    ill = f"; {len(search.ill_posed)} ill-posed state(s) left out, whose shape depends on the mesh" if search.ill_posed else ""
+    return f"searched: {', '.join(parts)}{ill}"

@@ -14,22 +14,22 @@ from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
 from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
-from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
+from ..solve.special_points import FOLDS, Located, Segment, branch_points, branches_crossing
 from ..solve.start import CONTACT, moderate, start_at_volume
 from ..solve.state import Path, at_rest
+from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
-from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
-
+from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
 
 
 @one_thread
 def trace(
     scene: Scene,
     *,
-    start: float | Equilibrium | Branch | None = None,
+    start: float | Equilibrium | SpecialPoint | Branch | None = None,
     until: Mapping[str, float] | None = None,
     direction: int = 1,
     max_steps: int = 400,
@@ -45,15 +45,18 @@ def trace(
     Parameters
     ----------
     scene : Scene
-    start : float, Equilibrium or Branch, optional
+    start : float, Equilibrium, SpecialPoint or Branch, optional
         A volume (default that of the moderately inflated membrane: that at rest and 0.5, or an eighth of it), an equilibrium of this scene,
         or a traced branch to be continued (its points are part of the result, and the new ones are those of an uninterrupted trace to
-        the last bit; it keeps its own direction, step and search for special points).
+        the last bit; it keeps its own direction, step and search for special points). From a branch point (of the ``special_points`` of
+        a branch of this scene) the *other* branch that crosses there is traced, one half of it: ``fm.trace(scene, start=point)``. From
+        another special point that is an equilibrium of this branch the trace sets out as from that equilibrium.
     until : mapping, optional
         Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it. The
         start itself does not count, and what lies behind it is met, if at all, on a distant part of the branch: see ``direction``.
     direction : {1, -1}
-        1 sets out towards larger volume.
+        1 sets out towards larger volume. From a branch point it names the half of the other branch: 1 that on which the volume grows,
+        or where it is stationary, as on both halves of a pitchfork, that on which the pole rises (with the pole held, the membrane).
     max_steps : int
     steps : StepControl, optional
         Lengths and accuracy of the steps.
@@ -77,7 +80,8 @@ def trace(
     Raises
     ------
     InputError, SolveError
-        The latter when the start cannot be reached or no mesh meets the accuracy that the scene asks for, and for ``throw``: then it
+        The former also for an azimuthal onset as start: the states beyond it are not axisymmetric, and are not computed. The latter when
+        the start cannot be reached or no mesh meets the accuracy that the scene asks for, and for ``throw``: then it
         carries the branch as ``result``.
     """
     targets = _targets(until)
@@ -112,16 +116,17 @@ def resume_trace(
 
 def _on_mesh(
     scene: Scene,
-    start: float | Equilibrium | Branch | None,
+    start: float | Equilibrium | SpecialPoint | Branch | None,
     until: Mapping[str, float] | None,
     direction: int,
     max_steps: int,
     steps: StepControl | None,
     ill_posed: str,
-) -> tuple[Scene, float | Equilibrium | Branch | None, dict[str, float]]:
+) -> tuple[Scene, float | Equilibrium | SpecialPoint | Branch | None, dict[str, float]]:
     """The scene with a mesh, the start on it and the seconds that took; a branch that is continued keeps the mesh chosen for it."""
-    if isinstance(start, Branch) and scene.open and getattr(start.scene.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
-        return scene.replace(mesh=start.scene.mesh, degree=start.scene.degree), start, {}
+    kept = start.equilibrium.scene if isinstance(start, SpecialPoint) else start.scene if isinstance(start, Branch) else None
+    if kept is not None and scene.open and getattr(kept.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
+        return scene.replace(mesh=kept.mesh, degree=kept.degree), start, {}
 
     def follow(trial: Scene, begin: Equilibrium | None) -> Branch:
         first = start if begin is None else begin
@@ -136,6 +141,8 @@ def _on_mesh(
             ill_posed=ill_posed,
         )
 
+    if isinstance(start, SpecialPoint) and scene.open:
+        raise InputError("start", start.kind, "a special point of a branch of this scene, on the mesh chosen for it, is allowed")
     begin = start if isinstance(start, Equilibrium) else None
     chosen, begin, timings = on_chosen_mesh(scene, begin, follow, "arc-length")
     return chosen, start if begin is None else begin, timings
@@ -144,7 +151,7 @@ def _on_mesh(
 def trace_iter(
     scene: Scene,
     *,
-    start: float | Equilibrium | None = None,
+    start: float | Equilibrium | SpecialPoint | None = None,
     direction: int = 1,
     max_steps: int = 400,
     steps: StepControl | None = None,
@@ -168,7 +175,7 @@ def trace_iter(
 @one_thread
 def _begin(
     scene: Scene,
-    start: float | Equilibrium | Branch | None,
+    start: float | Equilibrium | SpecialPoint | Branch | None,
     direction: int,
     steps: StepControl | None,
     special_points: bool,
@@ -210,6 +217,7 @@ class _Tracing:
     regular: int = 0
     made: int = 0
     points: Iterator[BranchPoint] | None = None
+    crossing: Crossing | None = None
     unexplained: list[str] = field(default_factory=list)
     timings: dict[str, float] = field(default_factory=lambda: {"setup": 0.0, "solve": 0.0, "special_points": 0.0, "verdicts": 0.0})
 
@@ -217,7 +225,7 @@ class _Tracing:
     def begin(
         cls,
         scene: Scene,
-        start: float | Equilibrium | Branch | None,
+        start: float | Equilibrium | SpecialPoint | Branch | None,
         direction: int,
         steps: StepControl,
         special_points: bool,
@@ -234,6 +242,16 @@ class _Tracing:
                     "start", "a Branch", "a branch of this scene is allowed, to be continued the way it was going (direction=1)"
                 )
             return cls._continued(scene, potential, start, tracer, on_step, max_steps)
+        if isinstance(start, SpecialPoint):
+            if start.kind == "azimuthal_onset":
+                message = (
+                    f"the states that set in there have {start.azimuthal} wave(s) around the axis and are not computed; branch points, "
+                    "folds and equilibria are allowed"
+                )
+                raise InputError("start", "azimuthal_onset", message)
+            if start.kind == "branch_point":
+                return cls._switched(scene, potential, start, direction, tracer, special, on_step, max_steps)
+            start = start.equilibrium
         if isinstance(start, Equilibrium):
             state = resume(potential, start)
         elif start is None:
@@ -245,12 +263,38 @@ class _Tracing:
                 )
             state = start_at_volume(potential, float(start))
         else:
-            raise InputError("start", start, "a volume, an Equilibrium or a traced Branch is allowed")
+            raise InputError("start", start, "a volume, an Equilibrium, a SpecialPoint or a traced Branch is allowed")
         tracing = cls(scene, potential, first_point(potential, state, direction), tracer, [], special, on_step, max_steps)
-        tracing.timings["setup"] = time.perf_counter() - clock
-        tracing.add(tracing.point, clock)
-        tracing.regular = 1
-        return tracing
+        return tracing._begun(clock)
+
+    def _begun(self, clock: float) -> _Tracing:
+        self.timings["setup"] = time.perf_counter() - clock
+        self.add(self.point, clock)
+        self.regular = 1
+        return self
+
+    @classmethod
+    def _switched(
+        cls,
+        scene: Scene,
+        potential: Potential,
+        start: SpecialPoint,
+        direction: int,
+        tracer: Tracer,
+        special: list[SpecialPoint] | None,
+        on_step: OnStep | None,
+        max_steps: int,
+    ) -> _Tracing:
+        """On half of the branch that crosses at a branch point."""
+        clock = time.perf_counter()
+        if start.tangent is None or start.tangent.shape != (potential.space.n_free + 1,):
+            raise InputError("start", "branch_point", "one of the special_points of a branch of this scene is allowed")
+        state = restore(potential, start.equilibrium)
+        known = oriented_point(potential, state, 0.0, start.tangent[:-1], float(start.tangent[-1]))
+        crossing = crossing_at(potential, known)
+        tracing = cls(scene, potential, crossing.half(direction), tracer, [], special, on_step, max_steps, crossing=crossing)
+        tracing.points = points_beyond(potential, crossing, direction, tracer)
+        return tracing._begun(clock)
 
     @classmethod
     def _continued(
@@ -299,14 +343,16 @@ class _Tracing:
             self.points = trace_points(self.potential, self.point, self.tracer)
         new = next(self.points)
         self.timings["solve"] += time.perf_counter() - clock
-        segment = Segment(self.potential, self.point, new)
+        segment = Segment(self.potential, self.point, new, leaving=self.crossing is not None and len(self.found) == 1)
         met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
-        if self.special is not None:
-            self._look_for_special_points(segment, last)
+        closing = self._look_for_special_points(segment, last) if self.special is not None else None
+        last = closing or last
         self.add(last or new, clock)
         if self.special is not None:
             self._look_for_onsets(segment, last or new)
+        if closing is not None:
+            return Status.CLOSED, f"the branch came back to the branch point V = {closing.state.volume:.6g} at which it set out"
         if last is not None and not wellposed.unresolved_source(self.potential, last.state.x):
             return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
         self.point, self.regular = new, len(self.found)
@@ -315,7 +361,10 @@ class _Tracing:
         if unresolved := wellposed.unresolved_source(self.potential, new.state.x):
             return Status.DIPOLE_CONTACT, f"{unresolved} (V = {new.state.volume:.6g})"
         if self._contact(new):
-            return Status.DIPOLE_CONTACT, f"the membrane came within {CONTACT * self.potential.space.unit:g} of a source at V = {new.state.volume:.6g}"
+            return (
+                Status.DIPOLE_CONTACT,
+                f"the membrane came within {CONTACT * self.potential.space.unit:g} of a source at V = {new.state.volume:.6g}",
+            )
         return None
 
     def _ill_posed(self, point: BranchPoint) -> tuple[Status, str] | None:
@@ -334,21 +383,28 @@ class _Tracing:
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.max_steps + 1, new)
 
-    def _look_for_special_points(self, segment: Segment, last: BranchPoint | None) -> None:
-        clock = time.perf_counter()
+    def _look_for_special_points(self, segment: Segment, last: BranchPoint | None) -> BranchPoint | None:
+        """Keep the special points before the end of the trace; the branch point at which it set out, if it comes back to that."""
+        clock, closing = time.perf_counter(), None
         located = [fold for kind in FOLDS for fold in segment.folds(kind)]
-        turns = sum(fold.kind == "limit_point" for fold in located)
-        if (parity(segment.a) * parity(segment.b) < 0) != (turns % 2 == 1):
-            found = branch_point(segment)
-            if found is None:
+        if number := branches_crossing(segment):
+            crossed = branch_points(segment)
+            if len(crossed) < number:
                 a, b = segment.a.state, segment.b.state
                 self.unexplained.append(f"the inertia changes between V = {a.volume:.6g} and {b.volume:.6g} without a located point")
-            else:
-                located.append(found)
+            located += crossed
+            closing = next((found.point for found in crossed if self._back(found.point, last)), None)
         for fold in sorted(located, key=lambda f: f.point.sigma):
             if last is None or fold.point.sigma <= last.sigma:
                 self.special.append(self._special(fold))  # type: ignore[union-attr]
         self.timings["special_points"] += time.perf_counter() - clock
+        return closing
+
+    def _back(self, point: BranchPoint, last: BranchPoint | None) -> bool:
+        """Whether a branch point before the end of the trace is the one at which it set out."""
+        if len(self.found) < 3 or (last is not None and last.sigma < point.sigma):
+            return False
+        return same_crossing(self.potential, self.found[0].state, point.state.x)
 
     def _look_for_onsets(self, segment: Segment, end: BranchPoint) -> None:
         """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
@@ -366,8 +422,7 @@ class _Tracing:
                 self.timings["special_points"] += time.perf_counter() - clock
 
     def _special(self, fold: Located, azimuthal: int = 0) -> SpecialPoint:
-        eq = record(self.scene, self.potential, fold.point.state)
-        return SpecialPoint(fold.kind, eq.volume, eq.pressure, eq.center_height, fold.error, eq, azimuthal=azimuthal)
+        return special_point(self.scene, self.potential, fold, azimuthal)
 
     def _contact(self, point: BranchPoint) -> bool:
         return self.potential.distance_to_sources(point.state.x) < CONTACT * self.potential.space.unit

@@ -1,0 +1,266 @@
+"""From one branch to another at the point where they cross.
+
+At a simple crossing the matrix of the equations F(x, P) = E' - P V' = 0, [K, -V'], has two null vectors. One is (phi, 0) with K phi = 0 and
+V' . phi = 0; let g be the one across it. A combination alpha g + beta (phi, 0) is the direction of a branch if it solves Keller's algebraic
+bifurcation equation, with the exact second derivatives of F::
+
+    a alpha^2 + 2 b alpha beta + c beta^2 = 0,        a = phi . F''[g, g],    b = phi . F''[g, phi],    c = phi . F''[phi, phi]
+
+Its two solutions are the tangents of the two branches; the known branch is the one that its points on both sides lie along. Where c
+vanishes, as a symmetry demands, one of the branches runs along phi itself, with stationary pressure and volume: a pitchfork. Else the
+crossing is transcritical.
+
+The first state off the known branch is looked for at a prescribed distance across it. No state of the known branch is there, so that
+Newton's method cannot fall back to it.
+
+Source: H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..discretization.space import HESSIAN_PAIRS
+from ..errors import SolveError, Status
+from ..potential import Array, Evaluation, Potential
+from .banded import BorderedFactor, band_inner, band_product
+from .continuation import BranchPoint, Tracer, tangent_at, trace_points, unit_point
+from .controls import ArcLengthControl
+from .newton import TOLERANCE, correct
+from .state import Path, State, distance, inner
+
+#: a cubic coefficient this small beside the terms that cancel in it vanishes by symmetry
+SYMMETRIC = 1e-4
+#: difference of the states for derivatives, relative to the size of the membrane: the cube root of round-off
+_DIFFERENCE = 6e-6
+#: inverse iterations for the softest displacement: at a crossing the first one finds it
+_ITERATIONS = 6
+#: how often the first step off the known branch is halved
+_HALVINGS = 12
+#: a rate of the volume this small beside the terms that cancel in it is none
+_STATIONARY = 1e-5
+#: two located crossings closer than this, relative to the size of the displacement, are one
+SAME_CROSSING = 1e-3
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A point at which two branches cross.
+
+    Attributes
+    ----------
+    known : BranchPoint
+        The point with the tangent of the branch on which it was found.
+    across : BranchPoint
+        The same point with the vector across that branch, w.
+    other : BranchPoint
+        The same point with the tangent of the other branch.
+    pitchfork : bool
+        Whether one of the branches has stationary volume and pressure there, by a symmetry; else the crossing is transcritical.
+    """
+
+    known: BranchPoint
+    across: BranchPoint
+    other: BranchPoint
+    pitchfork: bool
+
+    def half(self, direction: int) -> BranchPoint:
+        """The start of one half of the other branch."""
+        return _oriented(self.other, direction)
+
+    def side(self, potential: Potential, point: BranchPoint) -> int:
+        """Which half of the other branch a nearby point lies on; 0 for one that is nearer to the known branch."""
+        dx, dp = point.state.x - self.known.state.x, point.state.pressure - self.known.state.pressure
+        own, other = _along(self.across, dx, dp), _along(self.across, self.other.tangent, self.other.tangent_pressure)
+        size = math.sqrt(max(inner(potential, dx, dp, dx, dp), 0.0))
+        return 0 if abs(own) < 0.5 * abs(other) * size else int(math.copysign(1, own * other))
+
+
+def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
+    """The branches at a located branch point of a known branch.
+
+    Raises
+    ------
+    SolveError
+        When the second derivatives do not single out another branch: more than two cross, or the two touch.
+    """
+    state = known.state
+    null = unit_point(potential, state, known.sigma, softest(potential, state)[0], 0.0)
+    rest = _across_null(potential, null)
+    (a, size_a), (b, size_b), (c, size_c) = (_second(potential, null, *pair) for pair in ((rest, rest), (rest, null), (null, null)))
+    pitchfork = abs(c) <= SYMMETRIC * size_c
+    c = 0.0 if pitchfork else c
+    square = b * b - a * c
+    if not square > SYMMETRIC**2 * (size_b * size_b + size_a * size_c):
+        raise SolveError("the branches that meet there could not be told apart", status=Status.NOT_CONVERGED)
+    larger = -(b + math.copysign(math.sqrt(square), b))  # the root that does not cancel; the other one by their product
+    tangents = [_combined(rest, null, alpha, beta) for alpha, beta in ((c, larger), (larger, a))]
+    cosines = [_along(tangent, known.tangent, known.tangent_pressure) for tangent in tangents]
+    mine = int(abs(cosines[1]) > abs(cosines[0]))
+    own, other = _oriented(tangents[mine], cosines[mine]), tangents[1 - mine]
+    cosine = _along(own, other.tangent, other.tangent_pressure)
+    return Crossing(own, _combined(other, own, 1.0, -cosine), _oriented(other, _upwards(potential, other)), pitchfork)
+
+
+def leave(potential: Potential, crossing: Crossing, direction: int, step: float) -> BranchPoint:
+    """The first point of a half of the other branch, at most a step away, with its tangent.
+
+    Raises
+    ------
+    SolveError
+        When no step leads to a state off the known branch.
+    """
+    start, border = crossing.half(direction), crossing.across
+    for _ in range(_HALVINGS):
+        x, p = start.state.x + step * start.tangent, start.state.pressure + step * start.tangent_pressure
+        result = correct(potential, ArcLengthControl(border.dual, border.dual_pressure, x, p), x, p)
+        if result.status is Status.CONVERGED:
+            dx, dp = result.x - x, result.pressure - p
+            if math.sqrt(max(inner(potential, dx, dp, dx, dp), 0.0)) <= 0.5 * step and not _on_known(
+                potential, crossing, result.x, result.pressure
+            ):
+                new = tangent_at(potential, State.of(result), start)
+                new.sigma = start.sigma + step
+                return new
+        step /= 2
+    at = start.state
+    message = f"no step off the known branch converges at the branch point V = {at.volume:.9g}, P = {at.pressure:.9g}"
+    raise SolveError(message, status=Status.STEP_UNDERFLOW)
+
+
+def points_beyond(potential: Potential, crossing: Crossing, direction: int, tracer: Tracer) -> Iterator[BranchPoint]:
+    """Points of a half of the other branch, one a step, for as long as the caller asks.
+
+    Raises
+    ------
+    SolveError
+        When the half cannot be entered, or no step of the smallest length converges.
+    """
+    start = crossing.half(direction)
+    new = leave(potential, crossing, direction, tracer.step)
+    tracer.path = Path()
+    for point in (start, new):
+        tracer.path.append(point.sigma, point.state.x, point.state.pressure, point.tangent, point.tangent_pressure)
+    yield new
+    yield from trace_points(potential, new, tracer)
+
+
+def same_crossing(potential: Potential, a: Array, b: Array) -> bool:
+    """Whether two located branch points, by their displacements, are one."""
+    return distance(potential, a, b) <= SAME_CROSSING * distance(potential, a, np.zeros_like(a))
+
+
+def softest(potential: Potential, state: State) -> tuple[Array, float]:
+    """The displacement at constant volume against which a state is softest, and its stiffness, signed, over the size of
+    that of the next one.
+
+    At a branch point it is phi, with K phi = 0 and V' . phi = 0, and the stiffness 0. Inverse iteration on two vectors.
+
+    Raises
+    ------
+    SolveError
+        Where the membrane has no stiffness at all.
+    """
+    border, kd, mass = state.evaluation.volume_gradient, potential.space.half_bandwidth, potential.mass
+    pair = list(np.random.default_rng(0).standard_normal((2, state.x.size)))
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # nothing resists in the flat membrane at rest
+        bordered = BorderedFactor(state.factor, border, border, 0.0)
+        for _ in range(_ITERATIONS):
+            pair = [bordered.solve(band_product(mass, kd, v), 0.0)[0] for v in pair]
+            pair[0] = pair[0] / np.sqrt(band_inner(mass, kd, pair[0], pair[0]))
+            pair[1] = pair[1] - band_inner(mass, kd, pair[0], pair[1]) * pair[0]
+            pair[1] = pair[1] / np.sqrt(band_inner(mass, kd, pair[1], pair[1]))
+        projected = np.array([[band_inner(state.evaluation.band, kd, u, v) for v in pair] for u in pair])
+    if not np.isfinite(projected).all():
+        raise SolveError("no displacement is the softest one there", status=Status.NOT_CONVERGED)
+    stiffness, combinations = np.linalg.eigh(projected)
+    first = int(np.argmin(np.abs(stiffness)))
+    phi = combinations[0, first] * pair[0] + combinations[1, first] * pair[1]
+    return phi / np.abs(phi).max(), float(stiffness[first] / (np.abs(stiffness).max() or 1.0))
+
+
+def _across_null(potential: Potential, null: BranchPoint) -> BranchPoint:
+    """The other null vector, with a rate of the pressure: K x = V' P', made regular by a border across phi."""
+    x, _ = BorderedFactor(null.state.factor, null.dual, null.dual, 0.0).solve(null.state.evaluation.volume_gradient, 0.0)
+    return unit_point(potential, null.state, null.sigma, x, 1.0)
+
+
+def _combined(u: BranchPoint, v: BranchPoint, alpha: float, beta: float) -> BranchPoint:
+    """The unit vector along alpha u + beta v, both of one point."""
+    return unit_point(
+        u.state.evaluation.potential,
+        u.state,
+        u.sigma,
+        alpha * u.tangent + beta * v.tangent,
+        alpha * u.tangent_pressure + beta * v.tangent_pressure,
+    )
+
+
+def _oriented(point: BranchPoint, sign: float) -> BranchPoint:
+    """A point with its tangent, or the opposite one where the sign is negative."""
+    s = -1.0 if sign < 0 else 1.0
+    return BranchPoint(point.state, point.sigma, s * point.tangent, s * point.tangent_pressure, s * point.dual, s * point.dual_pressure)
+
+
+def _along(point: BranchPoint, x: Array, p: float) -> float:
+    """Inner product of the tangent of a point with (x, P)."""
+    return float(point.dual @ x + point.dual_pressure * p)
+
+
+def _second(potential: Potential, left: BranchPoint, u: BranchPoint, v: BranchPoint) -> tuple[float, float]:
+    """phi . F''[u, v], with phi the tangent of ``left``, and the sum of the absolute contributions of the points of the membrane.
+
+    By the central difference along u of the exact derivative F'[v] = K v - V' v_P.
+    """
+    space, state = potential.space, left.state
+    u_size, size = float(np.abs(u.tangent).max()), float(max(np.ptp(space.Z), np.ptp(space.R), np.abs(state.x).max()))
+    e = _DIFFERENCE * size / u_size
+    phi, direction = (space.at_quadrature(p.tangent).reshape(4, -1) for p in (left, v))
+    forward, backward = (
+        _first(potential.evaluate(state.x + k * u.tangent, state.pressure + k * u.tangent_pressure), phi, direction, v.tangent_pressure)
+        for k in (e, -e)
+    )
+    terms = (forward - backward) / (2 * e)
+    return float(terms.sum()), float(np.abs(terms).sum())
+
+
+def _first(evaluation: Evaluation, phi: Array, v: Array, v_pressure: float) -> Array:
+    """phi . (K v - V' v_P) at each quadrature point, from the local variables of phi and v."""
+    stiffness = evaluation.stiffness_density.reshape(len(HESSIAN_PAIRS), -1)
+    total = -v_pressure * (phi * evaluation.force_density.reshape(8, -1)[4:]).sum(axis=0)
+    for density, (i, j) in zip(stiffness, HESSIAN_PAIRS, strict=True):
+        total = total + density * (phi[i] * v[j] + (phi[j] * v[i] if i != j else 0.0))
+    return total
+
+
+def _upwards(potential: Potential, point: BranchPoint) -> float:
+    """What the first half of a branch lets grow: the volume, where it is stationary the height of the pole, else that of the membrane."""
+    border, space = point.state.evaluation.volume_gradient, potential.space
+    rate = border @ point.tangent
+    if abs(rate) > _STATIONARY * (np.abs(border) @ np.abs(point.tangent)):
+        return float(rate)
+    largest = np.abs(point.tangent).max()
+    lift = point.rate("center_height", potential)
+    if abs(lift) > _STATIONARY * largest:
+        return lift
+    across = space.fields[1]
+    mean = float(point.dual[across].sum())
+    if abs(mean) > _STATIONARY * float(np.abs(point.dual[across]).sum()):
+        return mean
+    return float(point.tangent[np.argmax(np.abs(point.tangent))])
+
+
+def _on_known(potential: Potential, crossing: Crossing, x: Array, p: float) -> bool:
+    """Whether a state near the crossing is that of the known branch as far along it."""
+    known = crossing.known
+    dx = x - known.state.x
+    here, pressure = known.state.x, known.state.pressure
+    share = _along(known, dx, p - pressure)
+    guess, guessed = here + share * known.tangent, pressure + share * known.tangent_pressure
+    control = ArcLengthControl(known.dual, known.dual_pressure, guess, guessed)
+    result = correct(potential, control, guess, guessed, tolerance=math.sqrt(TOLERANCE))
+    return result.status is Status.CONVERGED and distance(potential, result.x, x) < 0.25 * distance(potential, x, here)

@@ -175,13 +175,16 @@ def bordered_factor(evaluation: Evaluation, row: Array, corner: float) -> Border
 def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
     """Largest step length 1, 1/2, 1/4, ... after which the simplified correction has shrunk."""
     potential, length = equations.potential, 1.0
+    # both corrections in the units of the first, which may be larger than the displacement itself
+    units = [max(pair) for pair in zip(potential.largest(equations.x), potential.largest(dx), strict=True)]
     while length > 1e-4:
         x, pressure = equations.x + length * dx, equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
         force = new.gradient - pressure * new.volume_gradient
         if np.isfinite(force).all():
             gap = equations.control.equation(potential.space, x, pressure, new)[0]
-            if relative_size(potential, equations.simplified_step(force, gap), equations.x) <= (1 - length / 2) * size:
+            left = potential.largest(equations.simplified_step(force, gap))
+            if max(c / unit if c else 0.0 for c, unit in zip(left, units, strict=True)) <= (1 - length / 2) * size:
                 break
         length /= 2
     return length

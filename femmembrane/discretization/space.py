@@ -86,6 +86,8 @@ class Space:
         Whether the parameter of the meridian is its radius.
     lengths : ndarray, shape (n_elements,)
         Arc length of each element at rest.
+    highest : ndarray, shape (n_quadrature,)
+        The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
     weights : ndarray, shape (n_quadrature, n_elements)
         2 pi times the quadrature weight on the reference element.
     """
@@ -164,6 +166,7 @@ class Space:
 
     def _tabulate(self, points: Array) -> None:
         value, slope = self.shape_functions(points[0])
+        self.highest = np.polynomial.legendre.legval(2 * points[0] - 1, np.eye(self.n_quadrature)[-1])
         zero = np.zeros_like(value)
         blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
         self.table = np.block(blocks)
@@ -225,6 +228,27 @@ class Space:
     def axis_heights(self, x: Array) -> list[float]:
         """Heights of the nodes on the axis and of rigid discs across it."""
         return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
+
+    @cached_property
+    def reference_area(self) -> float:
+        """Area of the membrane at rest, over R0^2."""
+        return float((self.weights * self.R * np.hypot(self.R_x, self.Z_x)).sum())
+
+    @cached_property
+    def center(self) -> float:
+        """Height of the middle between the first and the last end."""
+        return float(self._end_positions[1, [0, -1]].mean())
+
+    @cached_property
+    def spins(self) -> bool:
+        """Whether the reference surface is a whole sphere: turned about any diameter it is the same."""
+        if self.closed or not self.on_axis.all():
+            return False
+        height = self.Z - self.center
+        radius = np.hypot(self.R, height)
+        off = np.abs(radius / radius.max() - 1).max()
+        across = np.abs(self.R * self.R_x + height * self.Z_x) / (radius * np.hypot(self.R_x, self.Z_x))
+        return bool(max(off, across.max()) < 1e-9)
 
     @cached_property
     def _axis(self) -> list[tuple[int, float]]:

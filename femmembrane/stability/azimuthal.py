@@ -46,12 +46,18 @@ from ..solve.banded import band_product
 from ..solve.wellposed import ill_posed, interval, unsupported
 from ..threads import one_thread
 from .floating import pencil_of, rigid_part
+from .resolution import small_eigenvalue
 from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
 from .verdict import Verdict, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
 EQUAL_STRETCH = 1e-3
+
+#: departure from a rigid motion, relative to its size, below which the turned material of a sphere has only turned as a whole
+_ROUND = 1e-6
+#: iterations that lead from there to the eigenvector of the mesh, and the least part of its square that this must have in common with it
+_INVERSE_ITERATIONS, _ALIKE = 3, 0.9
 
 #: local variables (a, a_x, c, c_x, b, b_x); pairs (c_x, b_x), (a_x, c_x) and (b, b_x) never meet
 _A, _AX, _C, _CX, _B, _BX = range(6)
@@ -184,8 +190,12 @@ class AzimuthalOperator:
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
+    density : list of ndarray, shape (n_quadrature, n_elements)
+        What ``band`` integrates: second derivatives of the quadratic form at the points in the order of _PAIRS, times the weights.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.floating`.
+    spin : ndarray, shape (n_free,), or None
+        The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
     """
 
     band: Array
@@ -195,11 +205,13 @@ class AzimuthalOperator:
     n: int
     response: LocalResponse
     space: Space
+    density: list[Array]
     rigid: Array | None = None
+    spin: Array | None = None
 
     def pencil(self, constraint: Array | None = None) -> Pencil:
-        """K - lambda M, rigid motions taken out."""
-        return pencil_of(self.band, self.mass, self.half_bandwidth, constraint, 0.0, self.rigid)
+        """K - lambda M, motions that cost nothing taken out."""
+        return pencil_of(self.band, self.mass, self.half_bandwidth, self.spin if constraint is None else constraint, 0.0, self.rigid)
 
     def shape(self, mode: Array) -> dict[str, Array]:
         """A mode at the nodes, see :func:`azimuthal_shape`."""
@@ -340,19 +352,31 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     space = potential.space
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
-    band = layout.assemble(_density(space, response, potential.loads, pressure, n))
+    density = _density(space, response, potential.loads, pressure, n)
+    band = layout.assemble(density)
     for end in space.free_ends if n else ():
         rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
         i, j = layout.numbers[space.nodes[end], [_A // 2, _B // 2]]
         work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
-    rigid = _rigid_motions(space, layout, response, int(n))
-    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, rigid)
+    motions = _rigid_motions(space, response, int(n))
+    area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+    rigid, spin = None, None
+    if len(motions):
+        rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
+    if n == 1 and space.spins:
+        spin = _spin(space, layout, response, motions, pencil_of(band, layout.mass, layout.half_bandwidth, None, 0.0, rigid))
+    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
 
 
-def _rigid_motions(space: Space, layout: _Layout, r: LocalResponse, n: int) -> Array | None:
-    """The part of the mass that belongs to motions as a whole: along the axis at n = 0; a shift and a tilt, if they are free, at n = 1."""
+def _products(first: Array, second: Array, area: Array) -> Array:
+    """Inner products of fields (a, c, b) over the reference area."""
+    return np.einsum("ifqe,jfqe,qe->ij", first, second, area)
+
+
+def _rigid_motions(space: Space, r: LocalResponse, n: int) -> Array:
+    """Motions as a whole: along the axis at n = 0; a shift and a tilt, if they are free, at n = 1; shape (k, 3, n_quadrature, n_elements)."""
     one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
     shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
     if n == 0:
@@ -364,12 +388,34 @@ def _rigid_motions(space: Space, layout: _Layout, r: LocalResponse, n: int) -> A
             place = next(k for k, support in enumerate(space.supports) if "u" in support.held and not space.on_axis[k])
             height = (r.eta[0, 0], r.eta[-1, -1])[place]
             motions = [(r.eta - height, height - r.eta, -r.rho)]
-    if not motions:
-        return None
-    area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
-    fields = np.array(motions)
-    gram = np.einsum("ifqe,jfqe,qe->ij", fields, fields, area)
-    return rigid_part(np.stack([layout.integrate(motion * area) for motion in fields], axis=1), gram)
+    return np.array(motions).reshape(len(motions), 3, *r.rho.shape)
+
+
+def _spin(space: Space, layout: _Layout, r: LocalResponse, rigid: Array, pencil: Pencil) -> Array | None:
+    """The mass times the motion of a sphere's material in itself under its deformed shape; None where it is a rigid one.
+
+    Turned about an axis through its equator, a uniform sphere is the same sphere: whatever is integrated over its reference area, energies
+    of sources and loads included, stays as it is when the material moves along so. With v = (v_S, v_theta) the velocities of that rotation
+    along the reference sphere the motion is x_S v_S + x_theta v_theta/R. Of a round shape it is a tilt of the whole.
+    """
+    J = np.hypot(space.R_x, space.Z_x)
+    height = space.Z - space.center
+    along = (height * space.R_x - space.R * space.Z_x) / J**2
+    field = np.stack([along * r.rho_x, -r.rho / space.R * height, along * r.eta_x])[None]
+    area = space.weights * space.R * J
+    size = float(_products(field, field, area)[0, 0])
+    if len(rigid):
+        shares = np.linalg.solve(_products(rigid, rigid, area), _products(rigid, field, area))
+        field = field - np.einsum("ij,ifqe->jfqe", shares, rigid)
+        if _products(field, field, area)[0, 0] <= _ROUND**2 * size:
+            return None
+    product = layout.integrate(field[0] * area)
+    # slopes of the shape jump where elements meet: of the motion the mesh holds that eigenvector which is next to it, and next to zero
+    solver, kept = pencil.shifted_solver(0.0), product
+    for _ in range(_INVERSE_ITERATIONS):
+        mode, kept = pencil.normalised(pencil.solve(solver, kept))
+    alike = float(mode @ product) ** 2 >= _ALIKE * float(_products(field, field, area)[0, 0])
+    return kept if alike and abs(mode @ pencil.stiffness(mode)) <= small_eigenvalue(space) else None
 
 
 @lru_cache(maxsize=4)

@@ -343,7 +343,7 @@ class Space:
 
         Where the membrane is pinned along the axis, less the rigid motion that takes the pin away from its place.
         """
-        inverse = self._from_values
+        inverse = self.from_values
         x = np.zeros(self.n_free + 1)
         if self.pin is not None:
             w = w - self._at_pin(w)
@@ -356,7 +356,7 @@ class Space:
         return float(w[0, element] if element < self.n_elements else w[-1, -1])
 
     @cached_property
-    def _from_values(self) -> Array:
+    def from_values(self) -> Array:
         """Local coefficients from values at the interpolation points of an element."""
         values = self.shape_functions(_lobatto(self.degree))[0]
         return np.linalg.inv(values).astype(np.float64, copy=False)

@@ -26,7 +26,7 @@ from .newton import correct
 from .special_points import Segment
 from .state import Path, State, at_rest, flat_state
 from .stepping import march
-from .wellposed import ill_posed, is_slack
+from .wellposed import apparent, is_slack
 
 #: a moderately inflated membrane holds this much more than at rest, or that part of it. Below, one with sources is reached from there:
 #: turning sources on at the flat state starts from a singular Hessian
@@ -171,7 +171,7 @@ def _inflated(potential: Potential, volume: float) -> State:
             result = correct(potential, VolumeControl(volume), found, p, magnetic=0.0)
     if result.status is Status.CONVERGED:
         return State.of(result)
-    bad = ill_posed(potential, result.evaluation)
+    bad = apparent(potential, result.evaluation)
     if bad is not None and bad.slack:
         raise SolveError(f"no tension holds a dome of volume {volume:.6g}: {bad}", status=Status.SLACK)
     rest, size = potential.space.reference_volume, moderate(potential)

@@ -43,12 +43,12 @@ from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
 from ..solve.banded import band_product
-from ..solve.wellposed import ill_posed, interval, unsupported
+from ..solve.wellposed import compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
 from .floating import pencil_of, rigid_part
-from .resolution import small_eigenvalue
+from .resolution import small_eigenvalue, unresolved
 from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
-from .verdict import Verdict, verdict_from
+from .verdict import Verdict, against, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
@@ -190,7 +190,7 @@ class AzimuthalOperator:
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
-    density : list of ndarray, shape (n_quadrature, n_elements)
+    density : ndarray, shape (18, n_quadrature, n_elements)
         What ``band`` integrates: second derivatives of the quadratic form at the points in the order of _PAIRS, times the weights.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.floating`.
@@ -205,7 +205,7 @@ class AzimuthalOperator:
     n: int
     response: LocalResponse
     space: Space
-    density: list[Array]
+    density: Array
     rigid: Array | None = None
     spin: Array | None = None
 
@@ -238,7 +238,7 @@ class _Layout:
         self._tabulate(space)
         area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
         zero = np.zeros_like(area)
-        self.mass = self.assemble([area if i == j and i in (_A, _C, _B) else zero for i, j in _PAIRS])
+        self.mass = self.assemble(np.stack([area if i == j and i in (_A, _C, _B) else zero for i, j in _PAIRS]))
         self.mass.flags.writeable = False
         points = (space.interpolation_points()[:, 0] - space.mesh.breakpoints()[0]) / np.diff(space.mesh.breakpoints())[0]
         self.node_values = space.shape_functions(points)[0]
@@ -261,10 +261,10 @@ class _Layout:
         inside = (row < self.n_free) & (column < self.n_free)
         self._band_index = np.where(inside, column * depth + 2 * kd + row - column, self.n_free * depth).ravel()
 
-    def assemble(self, density: list[Array]) -> Array:
-        """Integrate second derivatives in the order of _PAIRS, each of shape (n_quadrature, n_elements), to a band matrix."""
-        n_elements, n_local = density[0].shape[1], self.gather.shape[0]
-        local = (self._table @ np.stack(density).reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
+    def assemble(self, density: Array) -> Array:
+        """Integrate second derivatives in the order of _PAIRS, shape (18, n_quadrature, n_elements), to a band matrix."""
+        n_elements, n_local = density.shape[-1], self.gather.shape[0]
+        local = (self._table @ density.reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
         for row, element in self.flips:
             local[row, :, element] *= -1
             local[:, row, element] *= -1
@@ -352,7 +352,7 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     space = potential.space
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
-    density = _density(space, response, potential.loads, pressure, n)
+    density = np.stack(_density(space, response, potential.loads, pressure, n))
     band = layout.assemble(density)
     for end in space.free_ends if n else ():
         rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
@@ -376,7 +376,7 @@ def _products(first: Array, second: Array, area: Array) -> Array:
 
 
 def _rigid_motions(space: Space, r: LocalResponse, n: int) -> Array:
-    """Motions as a whole: along the axis at n = 0; a shift and a tilt, if they are free, at n = 1; shape (k, 3, n_quadrature, n_elements)."""
+    """Motions as a whole, shape (k, 3, n_quadrature, n_elements): along the axis at n = 0; a shift and a tilt, if free, at n = 1."""
     one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
     shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
     if n == 0:
@@ -645,12 +645,41 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     """
     _check_waves(n, 1)
     operator = azimuthal_operator(potential, x, pressure, n)
-    wrinkles = short_waves(potential, operator, potential.evaluate(np.asarray(x, dtype=float), pressure))
+    evaluation = potential.evaluate(np.asarray(x, dtype=float), pressure)
+    wrinkles = short_waves(potential, operator, evaluation)
     if wrinkles:
         return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
     found = _smallest(operator, guess)
-    among = f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
-    return verdict_from(found, among, None, operator.n, partial(azimuthal_shape, potential.space, operator.n))
+    shape = partial(azimuthal_shape, potential.space, operator.n)
+    # compression that is the mesh's alone says that the mesh is not to be trusted
+    false = not potential.scene.tension_field and any(least_stress(evaluation, component) for component in (0, 1))
+    part = np.inf if false else _unresolved(potential.space, operator, found.mode)
+    return verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
+
+
+def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float:
+    """:func:`.resolution.unresolved` of a mode."""
+    layout = _layout(space, min(operator.n, 2))
+    values, slopes = (space.table[k * space.n_quadrature : (k + 1) * space.n_quadrature, : space.degree + 1] for k in (0, 1))
+    fields = layout.local(mode).reshape(3, space.degree + 1, -1)
+    local = np.stack([table @ field for field in fields for table in (values, slopes)])
+    return unresolved(space, operator.density, _PAIRS, local)
+
+
+def mode_in(space: Space, n: int, mode: Array, onto: Space) -> Array:
+    """Coefficients in another space of the interpolant of a mode."""
+    kind = min(n, 2)
+    source, target = _layout(space, kind), _layout(onto, kind)
+    points = onto.interpolation_points()
+    element, xi = space.locate(points.ravel())
+    fields = source.local(mode).reshape(3, space.degree + 1, -1)[:, :, element]
+    values = np.einsum("qa,faq->fq", space.shape_functions(xi)[0], fields).reshape(3, *points.shape)
+    local = np.concatenate(onto.from_values @ values)
+    for row, at in target.flips:
+        local[row, at] *= -1
+    coefficients = np.zeros(target.n_free + 1)
+    coefficients[target.gather] = local
+    return coefficients[:-1]
 
 
 def short_waves(potential: Potential, operator: AzimuthalOperator, evaluation: Evaluation) -> str:
@@ -661,11 +690,9 @@ def short_waves(potential: Potential, operator: AzimuthalOperator, evaluation: E
     """
     if potential.scene.tension_field:
         return str(ill_posed(potential, evaluation) or "")
-    r, R = operator.response, operator.space.R
-    scale = max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
     found = []
-    for name, stress, lines in (("meridional", r.s1, "circles"), ("hoop", r.s2, "meridians")):
-        bad = R[unsupported(stress, scale, False)]
-        if bad.size:
-            found.append(f"{name} stress compressive at {interval(bad.min(), bad.max())}: wrinkles along {lines}")
+    for component, (name, lines) in enumerate((("meridional", "circles"), ("hoop", "meridians"))):
+        zone = compressed(potential, evaluation, component)
+        if zone is not None:
+            found.append(f"{name} stress compressive at {interval(*zone)}: wrinkles along {lines}")
     return "; ".join(found)

@@ -9,7 +9,10 @@ of the eigenvalue's own.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..discretization.space import HESSIAN_PAIRS, Space
 from ..potential import Array, Evaluation
@@ -35,10 +38,18 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
     local : ndarray, shape (n_variables, n_quadrature, n_elements)
         Local variables of the mode, normalised in the mass.
     """
-    integrand = np.zeros(local.shape[1:])
-    for (i, j), part in zip(pairs, density, strict=True):
-        integrand += (1 if i == j else 2) * part * local[i] * local[j]
-    return float(np.abs(space.highest @ integrand).sum())
+    first, second, times = _indices(pairs)
+    products = local[first]
+    products *= local[second]
+    products *= density
+    return float(np.abs(space.highest @ np.tensordot(times, products, 1)).sum())
+
+
+@lru_cache(maxsize=8)
+def _indices(pairs: tuple[tuple[int, int], ...]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """First and second of each pair, and how often it counts in a quadratic form."""
+    first, second = np.array(pairs).T
+    return first, second, np.where(first == second, 1.0, 2.0)
 
 
 def unresolved_axisymmetric(space: Space, evaluation: Evaluation, mode: Array) -> float:

@@ -24,6 +24,9 @@ from .state import State
 #: stress relative to the largest one that counts as none
 NO_STRESS = 1e-8
 
+#: tension in a finer space, relative to the largest stress, that contradicts a coarser one in which none is left
+_LITTLE = 0.05
+
 
 @dataclass(frozen=True)
 class IllPosed:
@@ -53,8 +56,15 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     if found is None:
         return None
     if found.slack:
-        return found if survives(lambda f: apparent(f.evaluation.potential, f.evaluation) is not None, potential, evaluation) else None
+        return found if survives(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation) else None
     return found if compressed(potential, evaluation, 0) is not None else None
+
+
+def _nearly_slack(evaluation: Evaluation) -> bool:
+    """Whether little meridional tension is left anywhere: a mesh folds before the membrane does, the sooner the coarser it is."""
+    return apparent(evaluation.potential, evaluation) is not None or bool(
+        evaluation.stress[0].min() < _LITTLE * np.abs(evaluation.stress).max()
+    )
 
 
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:

@@ -230,9 +230,15 @@ class Space:
         return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
 
     @cached_property
+    def area_weights(self) -> Array:
+        """Weights of the integral over the reference area, with the 2 pi, shape (n_quadrature, n_elements)."""
+        area: Array = self.weights * self.R * np.hypot(self.R_x, self.Z_x)
+        return area
+
+    @cached_property
     def reference_area(self) -> float:
         """Area of the membrane at rest, over R0^2."""
-        return float((self.weights * self.R * np.hypot(self.R_x, self.Z_x)).sum())
+        return float(self.area_weights.sum())
 
     @cached_property
     def center(self) -> float:

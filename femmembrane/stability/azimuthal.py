@@ -360,10 +360,10 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
         work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
-    motions = _rigid_motions(space, response, int(n))
-    area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
     rigid, spin = None, None
+    motions = _rigid_motions(space, response, int(n))
     if len(motions):
+        area = space.area_weights
         rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
     if n == 1 and space.spins:
         spin = _spin(space, layout, response, motions, pencil_of(band, layout.mass, layout.half_bandwidth, None, 0.0, rigid))
@@ -377,18 +377,20 @@ def _products(first: Array, second: Array, area: Array) -> Array:
 
 def _rigid_motions(space: Space, r: LocalResponse, n: int) -> Array:
     """Motions as a whole, shape (k, 3, n_quadrature, n_elements): along the axis at n = 0; a shift and a tilt, if free, at n = 1."""
+    if n > 1 or (n == 1 and not any(space.rotations)) or (n == 0 and space.pin is None):
+        return np.zeros((0, 3, *r.rho.shape))
     one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
     shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
     if n == 0:
-        motions = [(zero, zero, one)] if space.pin is not None else []
+        motions = [(zero, zero, one)]
     else:
-        free = space.rotations if n == 1 else (False, False)
+        free = space.rotations
         motions = [motion for motion, is_free in zip((shift, tilt), free, strict=True) if is_free]
         if free == (False, True):  # about the circle that is held in its plane
             place = next(k for k, support in enumerate(space.supports) if "u" in support.held and not space.on_axis[k])
             height = (r.eta[0, 0], r.eta[-1, -1])[place]
             motions = [(r.eta - height, height - r.eta, -r.rho)]
-    return np.array(motions).reshape(len(motions), 3, *r.rho.shape)
+    return np.array(motions)
 
 
 def _spin(space: Space, layout: _Layout, r: LocalResponse, rigid: Array, pencil: Pencil) -> Array | None:
@@ -402,7 +404,7 @@ def _spin(space: Space, layout: _Layout, r: LocalResponse, rigid: Array, pencil:
     height = space.Z - space.center
     along = (height * space.R_x - space.R * space.Z_x) / J**2
     field = np.stack([along * r.rho_x, -r.rho / space.R * height, along * r.eta_x])[None]
-    area = space.weights * space.R * J
+    area = space.area_weights
     size = float(_products(field, field, area)[0, 0])
     if len(rigid):
         shares = np.linalg.solve(_products(rigid, rigid, area), _products(rigid, field, area))
@@ -660,10 +662,10 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
 def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float:
     """:func:`.resolution.unresolved` of a mode."""
     layout = _layout(space, min(operator.n, 2))
-    values, slopes = (space.table[k * space.n_quadrature : (k + 1) * space.n_quadrature, : space.degree + 1] for k in (0, 1))
-    fields = layout.local(mode).reshape(3, space.degree + 1, -1)
-    local = np.stack([table @ field for field in fields for table in (values, slopes)])
-    return unresolved(space, operator.density, _PAIRS, local)
+    local = space.table[: 2 * space.n_quadrature, : space.degree + 1] @ layout.local(mode).reshape(3, space.degree + 1, -1)
+    local = local.reshape(6, *space.R.shape)
+    stress = np.stack([operator.response.s1, operator.response.s2])
+    return unresolved(space, operator.density, _PAIRS, local, stress)
 
 
 def mode_in(space: Space, n: int, mode: Array, onto: Space) -> Array:

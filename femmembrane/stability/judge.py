@@ -18,6 +18,8 @@ from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
 
 #: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once
 _CLEAR = 2.0
+#: part of the way that is left after a step of the slowest convergence that is counted on
+_SLOWEST = 0.1
 #: what is said of a compression that a finer space contradicts
 _FALSE = "stress is compressive on this mesh alone, not on elements of higher degree"
 #: discretisation errors are estimated to a factor of two or so: this many times the estimate contain them
@@ -89,19 +91,26 @@ def _with_discretisation_error(
     value, unknown = verdict.smallest_eigenvalue, _CLEAR * verdict._unresolved
     better = _finer_verdict(verdict, potential, pressure, evaluation, ask, 1)
     if better is None:  # nothing to compare with: the part that is not resolved stands for the error
-        return verdict if abs(value) >= unknown else _open(verdict, unknown, potential, evaluation)
-    error = verdict.error + SAFETY * abs(better.smallest_eigenvalue - value)
-    if abs(value) > error:
+        return verdict if abs(value) >= unknown else _open(verdict, unknown)
+    change = abs(better.smallest_eigenvalue - value)
+    error, hidden = verdict.error + SAFETY * change, abs(value) <= verdict._unresolved
+    zero = _ZERO * small_eigenvalue(potential.space)
+    if abs(value) > error and (not hidden or error <= zero):
         return replace(verdict, error=error)
-    if min(abs(value), error) <= _ZERO * small_eigenvalue(potential.space):
+    if abs(value) <= error and min(abs(value), error) <= zero:
         reason = f"marginal: the smallest eigenvalue {value:.3g} is zero within its discretisation error {error:.1g}"
         return replace(verdict, stable=None, error=error, reason=reason)
     best = _finer_verdict(verdict, potential, pressure, evaluation, ask, 2)
     if best is None:
-        return _open(verdict, error, potential, evaluation)
-    left = best.error + SAFETY**2 * abs(best.smallest_eigenvalue - better.smallest_eigenvalue)  # convergence has hardly begun
+        return _open(verdict, error)
+    rest = abs(best.smallest_eigenvalue - better.smallest_eigenvalue)
+    # changes that shrink slowly add up, as those of a geometric series, and may yet grow where convergence has hardly begun
+    error = verdict.error + 2 * SAFETY * max(change / max(1 - rest / change, _SLOWEST) if change else 0.0, change + rest)
+    if abs(value) > error:
+        return replace(verdict, error=error)
+    left = best.error + SAFETY**2 * rest
     if abs(best.smallest_eigenvalue) <= left:
-        return _open(verdict, max(error, SAFETY * abs(best.smallest_eigenvalue - value)), potential, evaluation)
+        return _open(verdict, max(error, SAFETY * abs(best.smallest_eigenvalue - value)))
     numbers = f"{best.smallest_eigenvalue:.6g} on elements of higher degree; {value:.3g} on this mesh, which does not resolve it"
     stable = best.smallest_eigenvalue > 0
     reason = in_words(stable, best.negative_directions, against(verdict.control, verdict.azimuthal), numbers)
@@ -128,7 +137,7 @@ def _finer_verdict(
     return replace(better, coefficients=mode)
 
 
-def _open(verdict: Verdict, error: float, potential: Potential, evaluation: Evaluation) -> Verdict:
+def _open(verdict: Verdict, error: float) -> Verdict:
     """The verdict where the mesh leaves the sign open."""
     error = max(error, abs(verdict.smallest_eigenvalue))
     what = "the sign of the smallest eigenvalue"

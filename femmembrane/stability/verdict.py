@@ -99,7 +99,8 @@ def axisymmetric_verdict(
         raise (
             unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
         )
-    bad = ill_posed(potential, evaluation)
+    shown = apparent(potential, evaluation)
+    bad = ill_posed(potential, evaluation) if shown else None
     if bad is not None:
         reason = f"short-wave unstable: {bad}, and the spectrum has no lower bound under refinement"
         return Verdict(False, np.nan, np.nan, control, 0, None, reason)
@@ -112,7 +113,7 @@ def axisymmetric_verdict(
     )
     shape = partial(mode_shape, potential.space)
     # compression that is the mesh's alone says that the mesh is not to be trusted
-    unresolved = np.inf if apparent(potential, evaluation) else unresolved_axisymmetric(potential.space, evaluation, found.mode)
+    unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
     return verdict_from(found, against(control, 0), control, 0, shape, unresolved)
 
 

@@ -82,24 +82,26 @@ def counterpart(
         Default that which balances the forces best.
     held : {"volume", "pressure"}
         What is the same in both; where that leads to no state near by, as next to a fold of it, the branch is met as in :func:`met`.
-    level : int
-        How many times the space is made finer, see :func:`finer_scene`.
+    level : {1, 2}
+        1 for the space of :func:`finer_scene`, 2 for one of one degree more again, on elements of half the size: what is of the size of an
+        element changes with it.
     """
     if isinstance(potential, Family):  # of many scenes at once
         return None
     if pressure is None:
         across = evaluation.volume_gradient
         pressure = float(evaluation.gradient @ across / (across @ across or 1.0))
-    found = _counterpart(potential, evaluation.x.tobytes(), float(pressure), evaluation.factor, held)
+    found = _counterpart(potential, evaluation.x.tobytes(), float(pressure), evaluation.factor, held, False)
     if found is None or level == 1:
         return found
-    return counterpart(found.evaluation.potential, found.evaluation, found.pressure, held, level - 1)
+    return _counterpart(found.evaluation.potential, found.x.tobytes(), found.pressure, evaluation.factor, held, True)
 
 
 @lru_cache(maxsize=16)
-def _counterpart(potential: Potential, state: bytes, pressure: float, factor: float, held: str) -> NewtonResult | None:
+def _counterpart(potential: Potential, state: bytes, pressure: float, factor: float, held: str, halved: bool) -> NewtonResult | None:
     """Remembered for the other questions about the same state."""
-    finer, x = potential_of(finer_scene(potential.scene)), np.frombuffer(state)
+    scene = finer_scene(potential.scene)
+    finer, x = potential_of(scene.replace(mesh=scene.mesh.refined()) if halved else scene), np.frombuffer(state)
     evaluation = potential.evaluate(x, pressure, factor)
     if relative_residual(potential, evaluation.gradient - pressure * evaluation.volume_gradient, evaluation, pressure) > _BALANCED:
         return None

@@ -21,7 +21,7 @@ _CLEAR = 2.0
 #: part of the way that is left after a step of the slowest convergence that is counted on
 _SLOWEST = 0.1
 #: what is said of a compression that a finer space contradicts
-_FALSE = "stress is compressive on this mesh alone, not on elements of higher degree"
+_FALSE = "stress is compressive on this mesh alone, not on finer elements"
 #: discretisation errors are estimated to a factor of two or so: this many times the estimate contain them
 SAFETY = 3.0
 #: part of a small eigenvalue below which one is zero: that of a marginal state of this mesh, or of a mesh on which zero means zero
@@ -86,7 +86,7 @@ def _with_discretisation_error(
 ) -> Verdict:
     """Solve again on elements of one degree more (or half the size): by how much an eigenvalue moves decides its sign.
 
-    Where the sign stays open although the mesh is too coarse to call it zero, one more degree is tried, and what it settles is reported.
+    Where the sign stays open although the mesh is too coarse to call it zero, a still finer space is tried; what it settles is reported.
     """
     value, unknown = verdict.smallest_eigenvalue, _CLEAR * verdict._unresolved
     better = _finer_verdict(verdict, potential, pressure, evaluation, ask, 1)
@@ -106,12 +106,12 @@ def _with_discretisation_error(
     rest = abs(best.smallest_eigenvalue - better.smallest_eigenvalue)
     # changes that shrink slowly add up, as those of a geometric series, and may yet grow where convergence has hardly begun
     error = verdict.error + 2 * SAFETY * max(change / max(1 - rest / change, _SLOWEST) if change else 0.0, change + rest)
-    if abs(value) > error:
+    if abs(value) > error and np.isfinite(verdict._unresolved):
         return replace(verdict, error=error)
     left = best.error + SAFETY**2 * rest
     if abs(best.smallest_eigenvalue) <= left:
         return _open(verdict, max(error, SAFETY * abs(best.smallest_eigenvalue - value)))
-    numbers = f"{best.smallest_eigenvalue:.6g} on elements of higher degree; {value:.3g} on this mesh, which does not resolve it"
+    numbers = f"{best.smallest_eigenvalue:.6g} on finer elements; {value:.3g} on this mesh, which does not resolve it"
     stable = best.smallest_eigenvalue > 0
     reason = in_words(stable, best.negative_directions, against(verdict.control, verdict.azimuthal), numbers)
     return replace(best, stable=stable, error=left, reason=reason, _shape=verdict._shape, _unresolved=verdict._unresolved)

@@ -42,7 +42,7 @@ class Verdict:
     error : float
         Of the eigenvalue: a bound on the algebraic error. Where the discretisation error could change the sign, that is where the mesh does
         not clearly resolve the mode and its state or the eigenvalue is small, three times the discretisation error as well, estimated on
-        elements of one degree more. Where they settle a sign that the scene's own mesh leaves open, value and error are theirs.
+        elements of one degree more. Where finer elements settle a sign that the scene's own mesh leaves open, value and error are theirs.
     control : str or None
         "pressure", "volume" or "gas"; None for azimuthal perturbations, where both agree.
     azimuthal : int

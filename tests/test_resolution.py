@@ -88,9 +88,9 @@ def pear(scene, volume=40.0):
 
 @pytest.mark.parametrize(("elements", "degree"), [(8, 3), (16, 3), (12, 2), (32, 2), (8, 4)])
 def test_a_pear_may_turn_its_material(elements, degree):
-    """Its n = 1 spectrum is 0 (the material turns under the shape), 2.509548, 3.117596 (16 elements of degree 6, recorded on 2026-11-28)."""
+    """n = 1: 0 (the material turns under the shape), 2.509548, 3.117596 (16 elements of degree 6, recorded on 2026-11-28)."""
     sphere, found = pear(fm.Scene(material=fm.Ogden.treloar(), mesh=fm.sphere(elements), degree=degree))
-    assert found.pressure == pytest.approx(0.909708227, rel=1e-6)
+    assert found.pressure == pytest.approx(0.909708227, rel=1e-5)
     assert found.verdict(azimuthal=1).stable is True
     assert found.verdict(azimuthal=1).smallest_eigenvalue == pytest.approx(2.509547916, rel=2e-4)
     assert [v.eigenvalue for v in found.frequencies(azimuthal=1, count=2)] == pytest.approx([2.509547916, 3.117596458], rel=2e-4)

@@ -121,8 +121,9 @@ def _finer_verdict(
     verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict], level: int
 ) -> Verdict | None:
     """The same question about the same state in a finer space, the mode interpolated; None where there is no answer."""
-    # held is what stays regular where this eigenvalue vanishes
-    found = counterpart(potential, evaluation, pressure, "pressure" if verdict.control == "volume" else "volume", level)
+    # held is the volume, unless this eigenvalue vanishes at its folds
+    at_fold = verdict.control == "volume" and abs(verdict.smallest_eigenvalue) < small_eigenvalue(potential.space)
+    found = counterpart(potential, evaluation, pressure, "pressure" if at_fold else "volume", level)
     if found is None:
         return None
     finer = found.evaluation.potential

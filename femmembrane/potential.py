@@ -138,11 +138,10 @@ class Potential:
         """Mass matrix of the reference area in band storage, shape (3 kd + 1, n_free)."""
         return self.space.mass_band()
 
-    @cached_property
+    @property
     def area(self) -> float:
         """Reference area of the membrane."""
-        space = self.space
-        return float((space.weights * space.R * np.hypot(space.R_x, space.Z_x)).sum())
+        return self.space.reference_area
 
     @cached_property
     def rigid(self) -> Array | None:

@@ -10,8 +10,8 @@ import pytest
 
 import femmembrane as fm
 from femmembrane.potential import Potential, potential_of, vectorise
-from femmembrane.solve.minimize import nlp_functions
 from femmembrane.solve.guess import spherical_dome
+from femmembrane.solve.minimize import nlp_functions
 
 from .cases import OGDEN, disc_scene
 

@@ -8,9 +8,9 @@ import pytest
 import femmembrane as fm
 from femmembrane.potential import potential_of
 from femmembrane.solve.controls import CenterHeightControl, PressureControl, VolumeControl
+from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.minimize import is_minimum, minimize_and_verify
 from femmembrane.solve.newton import correct
-from femmembrane.solve.guess import spherical_dome
 
 from .cases import CONTROLS, OGDEN, POINTS, PROBLEMS, SOLVERS, disc_scene
 

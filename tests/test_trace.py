@@ -128,11 +128,12 @@ def test_trace_stops_where_the_legendre_condition_fails():
 
 
 def test_compression_can_be_marked_instead():
+    """At pole heights from 0.32 to 0.235; what 16 quadratic elements show from 0.353 on, 16 of degree 3 and 4 do not."""
     scene = disc_scene(OGDEN, (600.0, -3.25), elements=16)
-    branch = fm.trace(scene, start=fm.equilibrium(scene, center_height=0.4), direction=-1, max_steps=12, ill_posed="mark", throw=False)
+    branch = fm.trace(scene, start=fm.equilibrium(scene, center_height=0.4), direction=-1, max_steps=30, ill_posed="mark", throw=False)
     marks = [eq.status is fm.Status.LEGENDRE_FAILURE for eq in branch]
     assert any(marks)
-    assert not marks[0]
+    assert all(eq.center_height < 0.33 for eq, mark in zip(branch, marks, strict=True) if mark)
 
 
 def test_a_change_of_inertia_that_is_not_explained_is_reported(monkeypatch):

@@ -18,7 +18,7 @@ from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.banded import negative_directions
 from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
-from ..solve.finer import finer_scene, moved, solved_in, solved_past_folds, transferred
+from ..solve.finer import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
 from ..solve.state import State
 from ..solve.wellposed import ill_posed
@@ -26,8 +26,6 @@ from ..stability.spectrum import SpectrumError
 from ..stability.verdict import Verdict, axisymmetric_verdict
 
 CONTROLS = ("volume", "pressure", "height")
-#: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
-FAR = 0.2
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,8 @@ class Space:
     unit : float
         Length by which everything of this membrane is measured, so that no answer hangs on the unit of its lengths: its largest radius,
         or its arc length where that is smaller, of a closed curve its arc length over 2 pi. It is 1 for a disc, a sphere, and a torus.
+    highest : ndarray, shape (n_quadrature,)
+        The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
     weights : ndarray, shape (n_quadrature, n_elements)
         2 pi times the quadrature weight on the reference element.
     """
@@ -176,6 +178,7 @@ class Space:
 
     def _tabulate(self, points: Array) -> None:
         value, slope = self.shape_functions(points[0])
+        self.highest = np.polynomial.legendre.legval(2 * points[0] - 1, np.eye(self.n_quadrature)[-1])
         zero = np.zeros_like(value)
         blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
         self.table = np.block(blocks)
@@ -237,6 +240,33 @@ class Space:
     def axis_heights(self, x: Array) -> list[float]:
         """Heights of the nodes on the axis and of rigid discs across it."""
         return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
+
+    @cached_property
+    def area_weights(self) -> Array:
+        """Weights of the integral over the reference area, with the 2 pi, shape (n_quadrature, n_elements)."""
+        area: Array = self.weights * self.R * np.hypot(self.R_x, self.Z_x)
+        return area
+
+    @cached_property
+    def reference_area(self) -> float:
+        """Area of the membrane at rest, over R0^2."""
+        return float(self.area_weights.sum())
+
+    @cached_property
+    def center(self) -> float:
+        """Height of the middle between the first and the last end."""
+        return float(self._end_positions[1, [0, -1]].mean())
+
+    @cached_property
+    def spins(self) -> bool:
+        """Whether the reference surface is a whole sphere: turned about any diameter it is the same."""
+        if self.closed or not self.on_axis.all():
+            return False
+        height = self.Z - self.center
+        radius = np.hypot(self.R, height)
+        off = np.abs(radius / radius.max() - 1).max()
+        across = np.abs(self.R * self.R_x + height * self.Z_x) / (radius * np.hypot(self.R_x, self.Z_x))
+        return bool(max(off, across.max()) < 1e-9)
 
     @cached_property
     def _axis(self) -> list[tuple[int, float]]:
@@ -331,7 +361,7 @@ class Space:
 
         Where the membrane is pinned along the axis, less the rigid motion that takes the pin away from its place.
         """
-        inverse = self._from_values
+        inverse = self.from_values
         x = np.zeros(self.n_free + 1)
         if self.pin is not None:
             w = w - self._at_pin(w)
@@ -354,7 +384,7 @@ class Space:
         return float(w[0, element] if element < self.n_elements else w[-1, -1])
 
     @cached_property
-    def _from_values(self) -> Array:
+    def from_values(self) -> Array:
         """Local coefficients from values at the interpolation points of an element."""
         values = self.shape_functions(_lobatto(self.degree))[0]
         return np.linalg.inv(values).astype(np.float64, copy=False)

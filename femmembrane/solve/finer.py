@@ -5,18 +5,27 @@ How far an answer moves when the space grows says how far it is from that of the
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
+
 import numpy as np
 
 from ..discretization.space import Space
 from ..errors import Status
-from ..potential import Array, Potential, potential_of
+from ..potential import Array, Evaluation, Family, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from .banded import band_product
 from .continuation import first_point
-from .controls import ArcLengthControl, Control
-from .newton import NewtonResult, correct
+from .controls import ArcLengthControl, Control, PressureControl, VolumeControl
+from .newton import NewtonResult, correct, relative_residual
 from .state import State, distance
 
+#: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
+FAR = 0.2
+#: spaces, each finer than the one before, in which a doubtful answer is looked at again
+LEVELS = (1, 2)
+#: relative residual above which a state is no equilibrium, and none of another space stands for it
+_BALANCED = 1e-6
 #: most iterations of a damped solve: ordinary ones take one to three
 _MAX_ITERATIONS = 30
 
@@ -33,34 +42,93 @@ def transferred(space: Space, x: Array, onto: Space) -> Array:
     return onto.interpolate(u.reshape(points.shape), w.reshape(points.shape))
 
 
-def solved_in(onto: Potential, control: Control, potential: Potential, x: Array, pressure: float, *, damped: bool = False) -> NewtonResult:
+def solved_in(
+    onto: Potential, control: Control, potential: Potential, x: Array, pressure: float, *, magnetic: float = 1.0, damped: bool = False
+) -> NewtonResult:
     """The equilibrium of another potential under a control, by Newton's method from a state carried over."""
     start = transferred(potential.space, x, onto.space)
     if damped:
-        return correct(onto, control, start, pressure, damped=True, max_iterations=_MAX_ITERATIONS)
-    return correct(onto, control, start, pressure)
-
-
-def solved_finer(control: Control, potential: Potential, x: Array, pressure: float) -> tuple[Potential, NewtonResult]:
-    """The equilibrium in the space of :func:`finer_scene` with its potential."""
-    finer = potential_of(finer_scene(potential.scene))
-    return finer, solved_in(finer, control, potential, x, pressure)
+        return correct(onto, control, start, pressure, magnetic=magnetic, damped=True, max_iterations=_MAX_ITERATIONS)
+    return correct(onto, control, start, pressure, magnetic=magnetic)
 
 
 def solved_past_folds(onto: Potential, control: Control, potential: Potential, state: State) -> NewtonResult:
-    """As :func:`solved_in`, for a state next to a fold of the control.
+    """As :func:`solved_in`, for a state next to a fold of the control: the branch is :func:`met` first, and then followed to it."""
+    result = met(onto, potential, state)
+    if result.status is not Status.CONVERGED:
+        return result
+    return correct(onto, control, result.x, result.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
 
-    The branch of the other space is met first where it crosses the plane through the state across its tangent, which is regular at folds
-    of every quantity, and then followed to the control.
-    """
+
+def met(onto: Potential, potential: Potential, state: State) -> NewtonResult:
+    """Where the branch of another space crosses the plane through a state across its tangent: regular at folds of every quantity."""
     point = first_point(potential, state, 1)
     start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
     dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / (onto.area * onto.space.unit**2)
     across = ArcLengthControl(dual, point.dual_pressure, start, state.pressure)
-    met = correct(onto, across, start, state.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
-    if met.status is not Status.CONVERGED:
-        return met
-    return correct(onto, control, met.x, met.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
+    factor = state.evaluation.factor
+    return correct(onto, across, start, state.pressure, magnetic=factor, damped=True, max_iterations=_MAX_ITERATIONS)
+
+
+def counterpart(
+    potential: Potential, evaluation: Evaluation, pressure: float | None = None, held: str = "volume", level: int = 1
+) -> NewtonResult | None:
+    """The state of an evaluation in a finer space, whose potential is ``result.evaluation.potential``; None where there is none.
+
+    Parameters
+    ----------
+    potential, evaluation : Potential, Evaluation
+    pressure : float, optional
+        Default that which balances the forces best.
+    held : {"volume", "pressure"}
+        What is the same in both; where that leads to no state near by, as next to a fold of it, the branch is met as in :func:`met`.
+    level : {1, 2}
+        1 for the space of :func:`finer_scene`, 2 for one of one degree more again, on elements of half the size: what is of the size of an
+        element changes with it.
+    """
+    if isinstance(potential, Family):  # of many scenes at once
+        return None
+    if pressure is None:
+        across = evaluation.volume_gradient
+        pressure = float(evaluation.gradient @ across / (across @ across or 1.0))
+    found = _counterpart(potential, evaluation.x.tobytes(), float(pressure), evaluation.factor, held, False)
+    if found is None or level == 1:
+        return found
+    return _counterpart(found.evaluation.potential, found.x.tobytes(), found.pressure, evaluation.factor, held, True)
+
+
+@lru_cache(maxsize=16)
+def _counterpart(potential: Potential, state: bytes, pressure: float, factor: float, held: str, halved: bool) -> NewtonResult | None:
+    """Remembered for the other questions about the same state."""
+    scene = finer_scene(potential.scene)
+    finer, x = potential_of(scene.replace(mesh=scene.mesh.refined()) if halved else scene), np.frombuffer(state)
+    evaluation = potential.evaluate(x, pressure, factor)
+    if relative_residual(potential, evaluation.gradient - pressure * evaluation.volume_gradient, evaluation, pressure) > _BALANCED:
+        return None
+    control = PressureControl(pressure) if held == "pressure" else VolumeControl(evaluation.volume)
+    tries: tuple[Callable[[], NewtonResult], ...] = (
+        lambda: solved_in(finer, control, potential, x, pressure, magnetic=factor),
+        lambda: solved_in(finer, control, potential, x, pressure, magnetic=factor, damped=True),
+        lambda: met(finer, potential, State(x, pressure, evaluation, 0, 0.0, 0.0, 0.0)),
+    )
+    start = transferred(potential.space, x, finer.space)
+    for attempt in tries:
+        with np.errstate(all="ignore"):  # a state of another space may be out of reach; it then does not converge
+            result = attempt()
+        if result.status is Status.CONVERGED and moved(finer, result.x, start) <= FAR:
+            return result
+    return None
+
+
+def survives(holds: Callable[[NewtonResult], bool], potential: Potential, evaluation: Evaluation, pressure: float | None = None) -> bool:
+    """Whether what a mesh shows of an equilibrium holds in finer spaces too; where the state is not found there nothing contradicts."""
+    for level in LEVELS:
+        found = counterpart(potential, evaluation, pressure, level=level)
+        if found is None:
+            return True
+        if not holds(found):
+            return False
+    return True
 
 
 def moved(onto: Potential, x: Array, before: Array) -> float:

@@ -17,7 +17,7 @@ from .banded import BorderedFactor
 from .controls import Control
 from .newton import NewtonResult, correct
 from .state import Path, State, distance
-from .wellposed import ill_posed, is_slack, slackness
+from .wellposed import apparent, is_slack, slackness
 
 #: largest change that the corrector may make, relative to the step
 MAX_DEVIATION = 0.2
@@ -102,7 +102,7 @@ def march(
             way = abs(stop - here) if parameter == "magnetic" else min(abs(stop - start), abs(here) or np.inf)
             if abs(step) < max(MIN_STEP * way, ROUND_OFF * abs(stop - start)):
                 message = f"the branch could not be followed beyond {here:.9g} on the way to {stop:.9g}"
-                bad = ill_posed(potential, accepted[-1].evaluation) if parameter == "load" else None
+                bad = apparent(potential, accepted[-1].evaluation) if parameter == "load" else None
                 if bad is not None:
                     raise SolveError(f"{message}: {bad}", status=bad.status, result=accepted)
                 raise SolveError(message, status=Status.STEP_UNDERFLOW, result=accepted)

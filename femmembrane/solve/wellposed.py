@@ -2,6 +2,9 @@
 
 The plain membrane is in compression along the meridian: the Legendre-Hadamard condition fails. In a tension field no stress is
 compressive, but where the meridional one vanishes nothing holds the meridian against the pressure: it folds on a circle there.
+
+A stress that a mesh does not resolve has a sign of the mesh's: slopes of a layer or a needle swing about the true ones within an element.
+Compression is pronounced where it exceeds the variation of the stress from element to element, or survives in a finer space.
 """
 
 from __future__ import annotations
@@ -15,10 +18,14 @@ from numpy.typing import NDArray
 from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
+from .finer import survives
 from .state import State
 
 #: stress relative to the largest one that counts as none
 NO_STRESS = 1e-8
+
+#: tension in a finer space, relative to the largest stress, that contradicts a coarser one in which none is left
+_LITTLE = 0.05
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,24 @@ class IllPosed:
 
 
 def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
-    """Where the state of an evaluation is ill-posed; None where it is nowhere."""
+    """Where the equilibrium of an evaluation is ill-posed; None where it is nowhere, or a finer space says so of what this one shows."""
+    found = apparent(potential, evaluation)
+    if found is None:
+        return None
+    if found.slack:
+        return found if survives(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation) else None
+    return found if compressed(potential, evaluation, 0) is not None else None
+
+
+def _nearly_slack(evaluation: Evaluation) -> bool:
+    """Whether little meridional tension is left anywhere: a mesh folds before the membrane does, the sooner the coarser it is."""
+    return apparent(evaluation.potential, evaluation) is not None or bool(
+        evaluation.stress[0].min() < _LITTLE * np.abs(evaluation.stress).max()
+    )
+
+
+def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
+    """Where the state of an evaluation, an equilibrium or not, is ill-posed on its own mesh."""
     slack = potential.scene.tension_field
     if not slack and evaluation.stress[0].min(initial=0.0) >= 0:  # the usual case needs no scale
         return None
@@ -53,6 +77,37 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     if slack:
         r = np.append(r, _folds(potential, evaluation.x, scale))
     return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
+
+
+def compressed(potential: Potential, evaluation: Evaluation, component: int) -> tuple[float, float] | None:
+    """Smallest and largest reference radius at which a principal stress (0 meridional, 1 hoop) is compressive, on any mesh; None if none.
+
+    A compression that the mesh alone shows is left out, see :func:`.finer.survives`.
+    """
+    if not least_stress(evaluation, component):
+        return None
+    stress = evaluation.stress[component]
+    plain = _plain(stress.reshape(potential.space.R.shape))
+    if not plain and not survives(lambda found: least_stress(found.evaluation, component) < 0, potential, evaluation):
+        return None
+    r = potential.space.R.ravel()[unsupported(stress, np.abs(evaluation.stress).max(), False)]
+    return float(r.min()), float(r.max())
+
+
+def least_stress(evaluation: Evaluation, component: int) -> float:
+    """The most compressive value of a principal stress (0 meridional, 1 hoop) on the mesh of a state; 0 where it is nowhere compressive."""
+    least = float(evaluation.stress[component].min(initial=0.0))
+    if least >= 0:  # the usual case needs no scale
+        return 0.0
+    return least if unsupported(np.array(least), np.abs(evaluation.stress).max(), False) else 0.0
+
+
+def _plain(stress: Array) -> bool:
+    """Whether an element and its neighbours are compressed by more than the stress varies in them."""
+    low, high = stress.min(axis=0), stress.max(axis=0)
+    low, high = np.pad(low, 1, mode="edge"), np.pad(high, 1, mode="edge")
+    low, high = (pick([part[:-2], part[1:-1], part[2:]], axis=0) for pick, part in ((np.min, low), (np.max, high)))
+    return bool((high < low - high).any())
 
 
 def _folds(potential: Potential, x: Array, scale: float) -> Array:
@@ -90,7 +145,7 @@ def slackness(potential: Potential, state: State, accepted: list[State] | None =
     """The error that ends a path at an ill-posed state, slack or compressed, with the states accepted before and it."""
     where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
     status = Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
-    return SolveError(f"at {where} {ill_posed(potential, state.evaluation)}", status=status, result=accepted)
+    return SolveError(f"at {where} {apparent(potential, state.evaluation)}", status=status, result=accepted)
 
 
 def unsupported(stress: Array, scale: float, tension_field: bool) -> NDArray[np.bool_]:

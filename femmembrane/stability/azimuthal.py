@@ -43,15 +43,21 @@ from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
 from ..solve.banded import band_product
-from ..solve.wellposed import ill_posed, interval, unsupported
+from ..solve.wellposed import compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
 from .floating import pencil_of, rigid_part
+from .resolution import small_eigenvalue, unresolved
 from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
-from .verdict import Verdict, verdict_from
+from .verdict import Verdict, against, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
 EQUAL_STRETCH = 1e-3
+
+#: departure from a rigid motion, relative to its size, below which the turned material of a sphere has only turned as a whole
+_ROUND = 1e-6
+#: iterations that lead from there to the eigenvector of the mesh, and the least part of its square that this must have in common with it
+_INVERSE_ITERATIONS, _ALIKE = 3, 0.9
 
 #: local variables (a, a_x, c, c_x, b, b_x); pairs (c_x, b_x), (a_x, c_x) and (b, b_x) never meet
 _A, _AX, _C, _CX, _B, _BX = range(6)
@@ -184,8 +190,12 @@ class AzimuthalOperator:
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
+    density : ndarray, shape (18, n_quadrature, n_elements)
+        What ``band`` integrates: second derivatives of the quadratic form at the points in the order of _PAIRS, times the weights.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.floating`.
+    spin : ndarray, shape (n_free,), or None
+        The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
     """
 
     band: Array
@@ -195,11 +205,13 @@ class AzimuthalOperator:
     n: int
     response: LocalResponse
     space: Space
+    density: Array
     rigid: Array | None = None
+    spin: Array | None = None
 
     def pencil(self, constraint: Array | None = None) -> Pencil:
-        """K - lambda M, rigid motions taken out."""
-        return pencil_of(self.band, self.mass, self.half_bandwidth, constraint, 0.0, self.rigid)
+        """K - lambda M, motions that cost nothing taken out."""
+        return pencil_of(self.band, self.mass, self.half_bandwidth, self.spin if constraint is None else constraint, 0.0, self.rigid)
 
     def shape(self, mode: Array) -> dict[str, Array]:
         """A mode at the nodes, see :func:`azimuthal_shape`."""
@@ -226,7 +238,7 @@ class _Layout:
         self._tabulate(space)
         area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
         zero = np.zeros_like(area)
-        self.mass = self.assemble([area if i == j and i in (_A, _C, _B) else zero for i, j in _PAIRS])
+        self.mass = self.assemble(np.stack([area if i == j and i in (_A, _C, _B) else zero for i, j in _PAIRS]))
         self.mass.flags.writeable = False
         points = (space.interpolation_points()[:, 0] - space.mesh.breakpoints()[0]) / np.diff(space.mesh.breakpoints())[0]
         self.node_values = space.shape_functions(points)[0]
@@ -249,10 +261,10 @@ class _Layout:
         inside = (row < self.n_free) & (column < self.n_free)
         self._band_index = np.where(inside, column * depth + 2 * kd + row - column, self.n_free * depth).ravel()
 
-    def assemble(self, density: list[Array]) -> Array:
-        """Integrate second derivatives in the order of _PAIRS, each of shape (n_quadrature, n_elements), to a band matrix."""
-        n_elements, n_local = density[0].shape[1], self.gather.shape[0]
-        local = (self._table @ np.stack(density).reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
+    def assemble(self, density: Array) -> Array:
+        """Integrate second derivatives in the order of _PAIRS, shape (18, n_quadrature, n_elements), to a band matrix."""
+        n_elements, n_local = density.shape[-1], self.gather.shape[0]
+        local = (self._table @ density.reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
         for row, element in self.flips:
             local[row, :, element] *= -1
             local[:, row, element] *= -1
@@ -340,36 +352,72 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     space = potential.space
     layout = _layout(space, min(n, 2))
     response = _response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
-    band = layout.assemble(_density(space, response, potential.loads, pressure, n))
+    density = np.stack(_density(space, response, potential.loads, pressure, n))
+    band = layout.assemble(density)
     for end in space.free_ends if n else ():
         rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
         i, j = layout.numbers[space.nodes[end], [_A // 2, _B // 2]]
         work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
-    rigid = _rigid_motions(space, layout, response, int(n))
-    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, rigid)
+    rigid, spin = None, None
+    motions = _rigid_motions(space, response, int(n))
+    if len(motions):
+        area = space.area_weights
+        rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
+    if n == 1 and space.spins:
+        spin = _spin(space, layout, response, motions, pencil_of(band, layout.mass, layout.half_bandwidth, None, 0.0, rigid))
+    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
 
 
-def _rigid_motions(space: Space, layout: _Layout, r: LocalResponse, n: int) -> Array | None:
-    """The part of the mass that belongs to motions as a whole: along the axis at n = 0; a shift and a tilt, if they are free, at n = 1."""
+def _products(first: Array, second: Array, area: Array) -> Array:
+    """Inner products of fields (a, c, b) over the reference area."""
+    return np.einsum("ifqe,jfqe,qe->ij", first, second, area)
+
+
+def _rigid_motions(space: Space, r: LocalResponse, n: int) -> Array:
+    """Motions as a whole, shape (k, 3, n_quadrature, n_elements): along the axis at n = 0; a shift and a tilt, if free, at n = 1."""
+    if n > 1 or (n == 1 and not any(space.rotations)) or (n == 0 and space.pin is None):
+        return np.zeros((0, 3, *r.rho.shape))
     one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
     shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
     if n == 0:
-        motions = [(zero, zero, one)] if space.pin is not None else []
+        motions = [(zero, zero, one)]
     else:
-        free = space.rotations if n == 1 else (False, False)
+        free = space.rotations
         motions = [motion for motion, is_free in zip((shift, tilt), free, strict=True) if is_free]
         if free == (False, True):  # about the circle that is held in its plane
             place = next(k for k, support in enumerate(space.supports) if "u" in support.held and not space.on_axis[k])
             height = (r.eta[0, 0], r.eta[-1, -1])[place]
             motions = [(r.eta - height, height - r.eta, -r.rho)]
-    if not motions:
-        return None
-    area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
-    fields = np.array(motions)
-    gram = np.einsum("ifqe,jfqe,qe->ij", fields, fields, area)
-    return rigid_part(np.stack([layout.integrate(motion * area) for motion in fields], axis=1), gram)
+    return np.array(motions)
+
+
+def _spin(space: Space, layout: _Layout, r: LocalResponse, rigid: Array, pencil: Pencil) -> Array | None:
+    """The mass times the motion of a sphere's material in itself under its deformed shape; None where it is a rigid one.
+
+    Turned about an axis through its equator, a uniform sphere is the same sphere: whatever is integrated over its reference area, energies
+    of sources and loads included, stays as it is when the material moves along so. With v = (v_S, v_theta) the velocities of that rotation
+    along the reference sphere the motion is x_S v_S + x_theta v_theta/R. Of a round shape it is a tilt of the whole.
+    """
+    J = np.hypot(space.R_x, space.Z_x)
+    height = space.Z - space.center
+    along = (height * space.R_x - space.R * space.Z_x) / J**2
+    field = np.stack([along * r.rho_x, -r.rho / space.R * height, along * r.eta_x])[None]
+    area = space.area_weights
+    size = float(_products(field, field, area)[0, 0])
+    if len(rigid):
+        shares = np.linalg.solve(_products(rigid, rigid, area), _products(rigid, field, area))
+        field = field - np.einsum("ij,ifqe->jfqe", shares, rigid)
+        if _products(field, field, area)[0, 0] <= _ROUND**2 * size:
+            return None
+    product = layout.integrate(field[0] * area)
+    # slopes of the shape jump where elements meet: of the motion the mesh holds that eigenvector which is next to it, and next to zero
+    solver, kept = pencil.shifted_solver(0.0), product
+    for _ in range(_INVERSE_ITERATIONS):
+        mode, kept = pencil.normalised(pencil.solve(solver, kept))
+    alike = float(mode @ product) ** 2 >= _ALIKE * float(_products(field, field, area)[0, 0])
+    return kept if alike and abs(mode @ pencil.stiffness(mode)) <= small_eigenvalue(space) else None
 
 
 @lru_cache(maxsize=4)
@@ -599,12 +647,41 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     """
     _check_waves(n, 1)
     operator = azimuthal_operator(potential, x, pressure, n)
-    wrinkles = short_waves(potential, operator, potential.evaluate(np.asarray(x, dtype=float), pressure))
+    evaluation = potential.evaluate(np.asarray(x, dtype=float), pressure)
+    wrinkles = short_waves(potential, operator, evaluation)
     if wrinkles:
         return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
     found = _smallest(operator, guess)
-    among = f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
-    return verdict_from(found, among, None, operator.n, partial(azimuthal_shape, potential.space, operator.n))
+    shape = partial(azimuthal_shape, potential.space, operator.n)
+    # compression that is the mesh's alone says that the mesh is not to be trusted
+    false = not potential.scene.tension_field and any(least_stress(evaluation, component) for component in (0, 1))
+    part = np.inf if false else _unresolved(potential.space, operator, found.mode)
+    return verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
+
+
+def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float:
+    """:func:`.resolution.unresolved` of a mode."""
+    layout = _layout(space, min(operator.n, 2))
+    local = space.table[: 2 * space.n_quadrature, : space.degree + 1] @ layout.local(mode).reshape(3, space.degree + 1, -1)
+    local = local.reshape(6, *space.R.shape)
+    stress = np.stack([operator.response.s1, operator.response.s2])
+    return unresolved(space, operator.density, _PAIRS, local, stress)
+
+
+def mode_in(space: Space, n: int, mode: Array, onto: Space) -> Array:
+    """Coefficients in another space of the interpolant of a mode."""
+    kind = min(n, 2)
+    source, target = _layout(space, kind), _layout(onto, kind)
+    points = onto.interpolation_points()
+    element, xi = space.locate(points.ravel())
+    fields = source.local(mode).reshape(3, space.degree + 1, -1)[:, :, element]
+    values = np.einsum("qa,faq->fq", space.shape_functions(xi)[0], fields).reshape(3, *points.shape)
+    local = np.concatenate(onto.from_values @ values)
+    for row, at in target.flips:
+        local[row, at] *= -1
+    coefficients = np.zeros(target.n_free + 1)
+    coefficients[target.gather] = local
+    return coefficients[:-1]
 
 
 def short_waves(potential: Potential, operator: AzimuthalOperator, evaluation: Evaluation) -> str:
@@ -615,11 +692,9 @@ def short_waves(potential: Potential, operator: AzimuthalOperator, evaluation: E
     """
     if potential.scene.tension_field:
         return str(ill_posed(potential, evaluation) or "")
-    r, R = operator.response, operator.space.R
-    scale = max(np.abs(r.s1).max(initial=0.0), np.abs(r.s2).max(initial=0.0))
     found = []
-    for name, stress, lines in (("meridional", r.s1, "circles"), ("hoop", r.s2, "meridians")):
-        bad = R[unsupported(stress, scale, False)]
-        if bad.size:
-            found.append(f"{name} stress compressive at {interval(bad.min(), bad.max())}: wrinkles along {lines}")
+    for component, (name, lines) in enumerate((("meridional", "circles"), ("hoop", "meridians"))):
+        zone = compressed(potential, evaluation, component)
+        if zone is not None:
+            found.append(f"{name} stress compressive at {interval(*zone)}: wrinkles along {lines}")
     return "; ".join(found)

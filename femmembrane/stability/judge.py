@@ -8,16 +8,24 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import InputError, Status
+from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
-from ..solve.controls import PressureControl, VolumeControl
-from ..solve.finer import solved_finer
-from .azimuthal import azimuthal_verdict
+from ..solve.finer import counterpart, transferred
+from .azimuthal import azimuthal_verdict, mode_in
+from .resolution import small_eigenvalue
 from .spectrum import SpectrumError
-from .verdict import CONTROLS, Verdict, axisymmetric_verdict
+from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
 
-#: size of an eigenvalue below which its discretisation error is estimated before its sign is believed
-SMALL = 1e-2
+#: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once
+_CLEAR = 2.0
+#: part of the way that is left after a step of the slowest convergence that is counted on
+_SLOWEST = 0.1
+#: what is said of a compression that a finer space contradicts
+_FALSE = "stress is compressive on this mesh alone, not on finer elements"
+#: discretisation errors are estimated to a factor of two or so: this many times the estimate contain them
+SAFETY = 3.0
+#: part of a small eigenvalue below which one is zero: that of a marginal state of this mesh, or of a mesh on which zero means zero
+_ZERO = 0.1
 
 
 def judge(
@@ -49,8 +57,11 @@ def judge(
         verdict = ask(potential, x, pressure, evaluation, guess=guess)
     except SpectrumError as error:  # one verdict that cannot be proved must not cost the run that asked for it
         return Verdict(None, np.nan, np.nan, control, int(azimuthal), None, f"not decided: {error}")
-    if abs(verdict.smallest_eigenvalue) < SMALL:  # never for NaN
-        verdict = _with_discretisation_error(verdict, potential, x, pressure, ask)
+    value = abs(verdict.smallest_eigenvalue)
+    if value < max(small_eigenvalue(potential.space), _CLEAR * verdict._unresolved):  # never for NaN
+        verdict = _with_discretisation_error(verdict, potential, pressure, evaluation, ask)
+        if np.isinf(verdict._unresolved):
+            verdict = replace(verdict, reason=f"{verdict.reason}; {_FALSE}")
     return verdict
 
 
@@ -70,19 +81,67 @@ def _verdict(
     return axisymmetric_verdict(potential, evaluation, control, guess, compliance)
 
 
-def _with_discretisation_error(verdict: Verdict, potential: Potential, x: Array, pressure: float, ask: Callable[..., Verdict]) -> Verdict:
-    """Solve again on elements of one degree more (or half the size): by how much an eigenvalue near zero moves decides its sign."""
-    # held is what stays regular where this eigenvalue vanishes
-    held = PressureControl(pressure) if verdict.control == "volume" else VolumeControl(potential.evaluate(x, pressure).volume)
-    finer, result = solved_finer(held, potential, x, pressure)
-    if result.status is not Status.CONVERGED:
-        return verdict
-    try:
-        better = ask(finer, result.x, result.pressure, result.evaluation)
-    except SpectrumError:
-        return verdict
-    error = verdict.error + abs(better.smallest_eigenvalue - verdict.smallest_eigenvalue)
-    if not abs(verdict.smallest_eigenvalue) <= error:
+def _with_discretisation_error(
+    verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict]
+) -> Verdict:
+    """Solve again on elements of one degree more (or half the size): by how much an eigenvalue moves decides its sign.
+
+    Where the sign stays open although the mesh is too coarse to call it zero, a still finer space is tried; what it settles is reported.
+    """
+    value, unknown = verdict.smallest_eigenvalue, _CLEAR * verdict._unresolved
+    better = _finer_verdict(verdict, potential, pressure, evaluation, ask, 1)
+    if better is None:  # nothing to compare with: the part that is not resolved stands for the error
+        return verdict if abs(value) >= unknown else _open(verdict, unknown)
+    change = abs(better.smallest_eigenvalue - value)
+    error, hidden = verdict.error + SAFETY * change, abs(value) <= verdict._unresolved
+    zero = _ZERO * small_eigenvalue(potential.space)
+    if abs(value) > error and (not hidden or error <= zero):
         return replace(verdict, error=error)
-    reason = f"marginal: the smallest eigenvalue {verdict.smallest_eigenvalue:.3g} is zero within its discretisation error {error:.1g}"
-    return replace(verdict, stable=None, error=error, reason=reason)
+    if abs(value) <= error and min(abs(value), error) <= zero:
+        reason = f"marginal: the smallest eigenvalue {value:.3g} is zero within its discretisation error {error:.1g}"
+        return replace(verdict, stable=None, error=error, reason=reason)
+    best = _finer_verdict(verdict, potential, pressure, evaluation, ask, 2)
+    if best is None:
+        return _open(verdict, error)
+    rest = abs(best.smallest_eigenvalue - better.smallest_eigenvalue)
+    # changes that shrink slowly add up, as those of a geometric series, and may yet grow where convergence has hardly begun
+    error = verdict.error + 2 * SAFETY * max(change / max(1 - rest / change, _SLOWEST) if change else 0.0, change + rest)
+    if abs(value) > error and np.isfinite(verdict._unresolved):
+        return replace(verdict, error=error)
+    left = best.error + SAFETY**2 * rest
+    if abs(best.smallest_eigenvalue) <= left:
+        return _open(verdict, max(error, SAFETY * abs(best.smallest_eigenvalue - value)))
+    numbers = f"{best.smallest_eigenvalue:.6g} on finer elements; {value:.3g} on this mesh, which does not resolve it"
+    stable = best.smallest_eigenvalue > 0
+    reason = in_words(stable, best.negative_directions, against(verdict.control, verdict.azimuthal), numbers)
+    return replace(best, stable=stable, error=left, reason=reason, _shape=verdict._shape, _unresolved=verdict._unresolved)
+
+
+def _finer_verdict(
+    verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict], level: int
+) -> Verdict | None:
+    """The same question about the same state in a finer space, the mode interpolated; None where there is no answer."""
+    # held is the volume, unless this eigenvalue vanishes at its folds
+    at_fold = verdict.control == "volume" and abs(verdict.smallest_eigenvalue) < small_eigenvalue(potential.space)
+    found = counterpart(potential, evaluation, pressure, "pressure" if at_fold else "volume", level)
+    if found is None:
+        return None
+    finer = found.evaluation.potential
+    try:
+        better = ask(finer, found.x, found.pressure, found.evaluation)
+    except SpectrumError:
+        return None
+    if better.coefficients is None:
+        return None
+    spaces, n = (finer.space, potential.space), verdict.azimuthal
+    mode = mode_in(spaces[0], n, better.coefficients, spaces[1]) if n else transferred(spaces[0], better.coefficients, spaces[1])
+    return replace(better, coefficients=mode)
+
+
+def _open(verdict: Verdict, error: float) -> Verdict:
+    """The verdict where the mesh leaves the sign open."""
+    error = max(error, abs(verdict.smallest_eigenvalue))
+    what = "the sign of the smallest eigenvalue"
+    number = f"{verdict.smallest_eigenvalue:.3g}, known within {error:.1g}" if np.isfinite(error) else f"{verdict.smallest_eigenvalue:.3g}"
+    advice = "refine it where stretches change fastest (a graded mesh), or take more elements or a higher degree"
+    return replace(verdict, stable=None, error=error, reason=f"not resolved: the mesh leaves {what} open ({number}); {advice}")

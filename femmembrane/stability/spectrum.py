@@ -118,7 +118,11 @@ class Pencil:
         return factor if self.constraint is None else BorderedFactor(factor, self.constraint, self.constraint, -self.compliance)
 
     def solve(self, solver: BandFactor | BorderedFactor, right: Array) -> Array:
-        return solver.solve(right) if isinstance(solver, BandFactor) else solver.solve(right, 0.0)[0]
+        if isinstance(solver, BandFactor):
+            return solver.solve(right)
+        if right.ndim == 2:
+            return np.stack([solver.solve(column, 0.0)[0] for column in right.T], axis=1)
+        return solver.solve(right, 0.0)[0]
 
     def normalised(self, mode: Array) -> tuple[Array, Array]:
         """Mode and M mode with mode . M mode = 1, the largest entry of the mode positive."""

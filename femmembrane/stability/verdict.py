@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..potential import Evaluation, Potential
-from ..solve.wellposed import ill_posed
+from ..solve.wellposed import apparent, ill_posed
 from .floating import pencil_of
+from .resolution import unresolved_axisymmetric
 from .spectrum import SmallestEigenvalue, smallest_of
 
 Array = NDArray[np.float64]
@@ -34,12 +35,14 @@ class Verdict:
     Attributes
     ----------
     stable : bool or None
-        None when the smallest eigenvalue is zero within its error, a marginal state, or (with NaN) could not be proved to be one.
+        None when the smallest eigenvalue is zero within its error, be it a marginal state or one whose sign the mesh does not resolve, or
+        (with NaN) could not be proved to be the smallest.
     smallest_eigenvalue : float
         lambda of K phi = lambda M phi, a squared natural frequency in units of mu/(rho_m R0^2); NaN where no eigenvalue has a meaning.
     error : float
-        Of the eigenvalue: a bound on the algebraic error; where the eigenvalue is below 0.01 also the discretisation error, estimated on
-        elements of one degree more.
+        Of the eigenvalue: a bound on the algebraic error. Where the discretisation error could change the sign, that is where the mesh does
+        not clearly resolve the mode and its state or the eigenvalue is small, three times the discretisation error as well, estimated on
+        elements of one degree more. Where finer elements settle a sign that the scene's own mesh leaves open, value and error are theirs.
     control : str or None
         "pressure", "volume" or "gas"; None for azimuthal perturbations, where both agree.
     azimuthal : int
@@ -60,6 +63,7 @@ class Verdict:
     reason: str
     coefficients: Array | None = field(default=None, repr=False)
     _shape: Shape | None = field(default=None, repr=False)
+    _unresolved: float = field(default=0.0, repr=False)
 
     @property
     def mode(self) -> Mapping[str, Array] | None:
@@ -95,7 +99,8 @@ def axisymmetric_verdict(
         raise (
             unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
         )
-    bad = ill_posed(potential, evaluation)
+    shown = apparent(potential, evaluation)
+    bad = ill_posed(potential, evaluation) if shown else None
     if bad is not None:
         reason = f"short-wave unstable: {bad}, and the spectrum has no lower bound under refinement"
         return Verdict(False, np.nan, np.nan, control, 0, None, reason)
@@ -106,21 +111,35 @@ def axisymmetric_verdict(
     found = smallest_of(
         pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid), guess
     )
-    held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control]
-    return verdict_from(found, f"axisymmetric perturbations {held}", control, 0, partial(mode_shape, potential.space))
+    shape = partial(mode_shape, potential.space)
+    # compression that is the mesh's alone says that the mesh is not to be trusted
+    unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
+    return verdict_from(found, against(control, 0), control, 0, shape, unresolved)
 
 
-def verdict_from(found: SmallestEigenvalue, among: str, control: str | None, n: int, shape: Shape) -> Verdict:
+def against(control: str | None, n: int) -> str:
+    """A class of perturbations in words."""
+    if n:
+        return f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
+    held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control or "volume"]
+    return f"axisymmetric perturbations {held}"
+
+
+def verdict_from(found: SmallestEigenvalue, among: str, control: str | None, n: int, shape: Shape, unresolved: float) -> Verdict:
     """The verdict that a smallest eigenvalue means for a class of perturbations, named in words."""
     stable = None if abs(found.value) <= found.error else found.value > 0
-    value = f"(smallest eigenvalue {found.value:.6g})"
     if stable is None:
         reason = f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}"
-    elif stable:
-        reason = f"stable: energy rises under all {among} {value}"
     else:
-        reason = f"unstable: energy falls in {found.negative} direction(s) among {among} {value}"
-    return Verdict(stable, found.value, found.error, control, n, found.negative, reason, found.mode, shape)
+        reason = in_words(stable, found.negative, among, f"{found.value:.6g}")
+    return Verdict(stable, found.value, found.error, control, n, found.negative, reason, found.mode, shape, unresolved)
+
+
+def in_words(stable: bool, negative: int | None, among: str, value: str) -> str:
+    """The reason of a verdict with a sign."""
+    if stable:
+        return f"stable: energy rises under all {among} (smallest eigenvalue {value})"
+    return f"unstable: energy falls in {negative} direction(s) among {among} (smallest eigenvalue {value})"
 
 
 def mode_shape(space: Space, mode: Array) -> dict[str, Array]:

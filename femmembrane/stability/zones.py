@@ -27,7 +27,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.space import Space, space_of_scene
 from ..errors import unknown_name
+from ..potential import potential_of
 from ..scene import WRINKLING, Scene
+from ..solve.finer import survives
+from ..solve.newton import NewtonResult
 from .profile import Profile, profile_at
 
 Array = NDArray[np.float64]
@@ -40,6 +43,8 @@ _BITS = (2, 1)
 _SAMPLES = 13
 #: rounds of dividing an interval with a root, and parts each time; what is left is shorter than _SLIVER
 _ROUNDS, _PARTS = 5, 32
+#: ends of elements within a zone from which on it is the membrane's without a further look
+_WIDE = 4
 #: zones shorter than this part of the meridian are round-off of a border
 _SLIVER = 1e-10
 
@@ -147,7 +152,8 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
 
     Signs are looked at in 13 points of each element and borders found between them as roots: a zone thinner than about a tenth of an
     element may be missed. From degree 4 on stresses jump at the ends of elements, where they may then also change sign. Where a meridian
-    bends sharply within an element its slopes overshoot, and a zone may be a mesh's. The cost grows with the number of elements.
+    bends sharply within an element its slopes overshoot: a zone of a few elements counts only if its stress is compressive in a finer
+    space as well. The cost grows with the number of elements.
 
     Parameters
     ----------
@@ -166,16 +172,62 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
     if not isinstance(criterion, str) or criterion not in WRINKLING:
         raise unknown_name("criterion", criterion, WRINKLING)
 
-    def deciding(s: Array) -> tuple[Array, Array]:
-        profile = profile_at(scene, x, pressure, s)
-        return profile.total if criterion == "total" else _mechanical(profile, scene.tension_field)
-
+    deciding = _deciding(scene, x, pressure, criterion)
     codes, edges = _tiles(space_of_scene(scene), deciding)
+    if any(codes):
+        codes, edges = _Check(scene, x, pressure, criterion).kept(codes, edges)
     area, deformed = _areas(scene, x, pressure, edges)
     ends = profile_at(scene, x, pressure, edges)
     r, rho, s = (list(zip(v[:-1].tolist(), v[1:].tolist(), strict=True)) for v in (ends.r, ends.rho, edges))
     parts = zip(codes, r, rho, area.tolist(), deformed.tolist(), s, strict=True)
     return Zones(criterion, tuple(Zone(KINDS[code], *rest) for code, *rest in parts))
+
+
+def _deciding(scene: Scene, x: Array, pressure: float, criterion: str) -> _Stresses:
+    def deciding(s: Array) -> tuple[Array, Array]:
+        profile = profile_at(scene, x, pressure, s)
+        return profile.total if criterion == "total" else _mechanical(profile, scene.tension_field)
+
+    return deciding
+
+
+class _Check:
+    """Which zones are the membrane's and which the mesh's."""
+
+    def __init__(self, scene: Scene, x: Array, pressure: float, criterion: str) -> None:
+        self.scene, self.x, self.pressure, self.criterion = scene, x, pressure, criterion
+        self.ends = space_of_scene(scene).ends
+
+    def kept(self, codes: list[int], edges: Array) -> tuple[list[int], Array]:
+        """The zones less those stresses whose compression ends within a few elements and is gone in a finer space."""
+        codes = list(codes)
+        for bit in _BITS:
+            for first, last in _runs([bool(code & bit) for code in codes]):
+                a, b = edges[first], edges[last + 1]
+                if np.searchsorted(self.ends, b, "right") - np.searchsorted(self.ends, a, "left") > _WIDE:
+                    continue  # as many elements do not err alike
+                if not self._survives(_BITS.index(bit), a, b):
+                    codes[first : last + 1] = [code & ~bit for code in codes[first : last + 1]]
+        new = [k for k in range(len(codes)) if k == 0 or codes[k] != codes[k - 1]]
+        return [codes[k] for k in new], np.append(edges[new], edges[-1])
+
+    def _survives(self, component: int, a: float, b: float) -> bool:
+        s = np.linspace(a, b, _SAMPLES + 2)
+        s[-1] = np.nextafter(b, a)  # at the end of an element its own slopes
+
+        def compressive(found: NewtonResult) -> bool:
+            finer = found.evaluation.potential.scene
+            return bool((_deciding(finer, found.x, found.pressure, self.criterion)(s)[component] < 0).any())
+
+        potential = potential_of(self.scene)
+        return survives(compressive, potential, potential.evaluate(self.x, self.pressure), self.pressure)
+
+
+def _runs(flags: Sequence[bool]) -> list[tuple[int, int]]:
+    """First and last place of each run of True."""
+    starts = [k for k, flag in enumerate(flags) if flag and (k == 0 or not flags[k - 1])]
+    stops = [k for k, flag in enumerate(flags) if flag and (k + 1 == len(flags) or not flags[k + 1])]
+    return list(zip(starts, stops, strict=True))
 
 
 def _mechanical(profile: Profile, tension_field: bool) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, SolveError, Status
-from ..potential import Family
+from ..potential import Evaluation, Family, Potential, potential_of
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
 from ..solve import wellposed
@@ -256,7 +256,7 @@ class _Following:
             self.add(new)
             if new.number in self.bounds:
                 return Status.CONVERGED, "", False
-            bad = wellposed.ill_posed(self.system.family, new.evaluation)
+            bad = wellposed.ill_posed(*self._own(new))
             if bad is not None and ill_posed == "stop":
                 return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh", False
             if self._clearance(new) < (least := CONTACT * self.system.family.space.unit):
@@ -275,9 +275,16 @@ class _Following:
             self.cusps.append(Cusp(kind, eq.volume, eq.pressure, eq.center_height, error, eq, value=point.number))
 
     def _record(self, point: FoldPoint) -> Equilibrium:
-        scene = self.parameter.scene_at(point.number)
-        state = State(point.x, point.pressure, point.evaluation, point.iterations, point.correction, point.residual, gap=0.0)
-        return record(scene, self.system.family, state)
+        potential, evaluation = self._own(point)
+        state = State(point.x, point.pressure, evaluation, point.iterations, point.correction, point.residual, gap=0.0)
+        return record(self.parameter.scene_at(point.number), potential, state)
+
+    def _own(self, point: FoldPoint) -> tuple[Potential, Evaluation]:
+        """Potential and evaluation of a point: those of its own scene where a finer space must be asked whether a compression is real."""
+        if wellposed.apparent(self.system.family, point.evaluation) is None:
+            return self.system.family, point.evaluation
+        potential = potential_of(self.parameter.scene_at(point.number))
+        return potential, potential.evaluate(point.x, point.pressure)
 
     def _clearance(self, point: FoldPoint) -> float:
         """Smallest distance between a node and a source."""

@@ -76,7 +76,7 @@ SHAPES: dict[str, Any] = {
     "curve": Curve,
 }
 #: keys of [mesh] beside the file that holds the meridian
-FILE_KEYS = ("divisions", "first", "last")
+FILE_KEYS = ("group", "divisions", "first", "last")
 CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
@@ -523,7 +523,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
-    keys["mesh"] |= {"shape", "file"} | arguments(*SHAPES.values())
+    keys["mesh"] |= {"shape", "file", *FILE_KEYS} | arguments(*SHAPES.values())
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
 
 

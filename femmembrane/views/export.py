@@ -123,7 +123,7 @@ def _write_obj(equilibrium: Equilibrium, path: Path) -> None:
 
 def _surface(equilibrium: Equilibrium) -> tuple[Array, Revolution]:
     profile = smooth_profile(equilibrium)
-    revolution = Revolution.of(profile["r"], closed=equilibrium.potential.space.closed)
+    revolution = Revolution.of_membrane(equilibrium, profile["r"])
     return revolution.vectors(profile["rho"], profile["eta"]), revolution
 
 
@@ -137,7 +137,7 @@ def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
 
     numbers, grids = path.with_suffix(".h5"), []
     with replace_file(numbers) as temporary, h5py.File(temporary, "w") as file:
-        revolution = Revolution.of(smooth_profile(branch[0])["r"], closed=branch[0].potential.space.closed)
+        revolution = Revolution.of_membrane(branch[0], smooth_profile(branch[0])["r"])
         mixed = [
             np.insert(cells, 0, code, axis=1).ravel() for code, cells in ((_TRIANGLE, revolution.triangles), (_QUAD, revolution.quads))
         ]

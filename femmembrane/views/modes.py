@@ -124,7 +124,7 @@ class ModeSurface:
         profile = smooth_profile(equilibrium)
         self.rho, self.eta = profile["rho"], profile["eta"]
         self.extent = Box.of([profile]).size
-        self.revolution = Revolution.of(profile["r"], max(sectors, _PER_WAVE * self.n), equilibrium.potential.space.closed)
+        self.revolution = Revolution.of_membrane(equilibrium, profile["r"], max(sectors, _PER_WAVE * self.n))
         self.rest = self.revolution.vectors(self.rho, self.eta)
         unit = _displacements(self.revolution, shape, self.n)
         if amplitude is None:

@@ -83,9 +83,11 @@ def merged(points: Array, cells: Cells) -> tuple[Cells, tuple[str, ...]]:
             cells, joined = number[cells], joined + int(same.sum())
             apart = float(distance[same].max(initial=0.0))
     if joined:
-        remarks.append(f"{joined} points were merged with others at the same place" + (f" (up to {apart:.1e} apart)" if apart else ""))
+        points_were = "1 point was" if joined == 1 else f"{joined} points were"
+        remarks.append(f"{points_were} merged with others at the same place" + (f" (up to {apart:.1e} apart)" if apart else ""))
     if twice:
-        remarks.append(f"{twice} cells that the file lists more than once were taken once")
+        cells_were = "1 cell that is listed more than once was" if twice == 1 else f"{twice} cells that are listed more than once were"
+        remarks.append(f"{cells_were} taken once")
     return cells, tuple(remarks)
 
 

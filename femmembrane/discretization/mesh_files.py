@@ -196,8 +196,7 @@ def meridian_from_points(
     """
     array = _array(points)
     if cells is None:
-        k = np.arange(len(array) - 1)
-        cells = np.stack([k, k + 1], axis=1)
+        return Curve(points=_tuples(array), divisions=divisions, first=first, last=last)
     return _ordered(array, np.asarray(cells), divisions=divisions, first=first, last=last)
 
 

@@ -37,6 +37,14 @@ READERS = {".vtu": "vtk_xml", ".msh": "gmsh", ".vtk": "vtk_legacy", ".xdmf": "xd
 class UnreadableError(Exception):
     """Why a file cannot be read."""
 
+    def __init__(self, reason: str) -> None:
+        super().__init__(printable(reason))
+
+
+def printable(text: str) -> str:
+    """A text from a file without what would move the cursor of a terminal, or worse."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
 
 @dataclass
 class Lines:
@@ -63,7 +71,7 @@ class Lines:
         block = np.asarray(cells, dtype=np.int64)
         if not block.size:
             return
-        names = frozenset(groups)
+        names = frozenset(printable(name) for name in groups)
         self.cells.setdefault(block.shape[1], []).append((block, names))
         self.groups |= names
 

@@ -38,12 +38,12 @@ class _Reader:
         self.of_curve: dict[int, list[int]] = {}
         self.found: list[tuple[NDArray[np.int64], frozenset[int]]] = []
         self.others: set[str] = set()
-        head = re.match(rb"\s*\$MeshFormat\s+(\d+)\.(\d+)\S* +([01]) +(\d+)[ \t\r]*\n", data)
+        head = re.match(rb"\s*\$MeshFormat\s+(\d+)(?:\.(\d+))?\S* +([01]) +(\d+)[ \t\r]*\n", data)
         if head is None:
             raise UnreadableError("it is no file of Gmsh of version 2 or 4: the section $MeshFormat is missing")
-        self.version = int(head[1]), int(head[2])
+        self.version = int(head[1]), int(head[2] or 0)
         if self.version not in ((2, 0), (2, 1), (2, 2), (4, 0), (4, 1)):
-            raise UnreadableError(f"it is of version {head[1].decode()}.{head[2].decode()} of Gmsh's format; 2.2, 4.0 and 4.1 are allowed")
+            raise UnreadableError(f"it is of version {self.version[0]}.{self.version[1]} of Gmsh's format; 2.2, 4.0 and 4.1 are allowed")
         self.binary, self.place = head[3] == b"1", head.end()
         self.size = "u8" if head[4] == b"8" else "u4"
         self.order = "<"

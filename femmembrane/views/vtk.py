@@ -182,6 +182,12 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
     return profile
 
 
+def shown_length(equilibrium: Equilibrium) -> float:
+    """Length in a file of the unit of length R0: 1, or what it is in m where the scene has scales."""
+    scales = equilibrium.scene.scales
+    return 1.0 if scales is None else scales.to_si("length", 1.0)
+
+
 def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
     """Write the surface of one equilibrium as a VTU file."""
     import meshio
@@ -189,8 +195,10 @@ def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: 
     revolution = Revolution.of_membrane(equilibrium, profile["r"])
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
+    if (scales := equilibrium.scene.scales) is not None:
+        loads |= {"pressure_pa": scales.to_si("pressure", loads["pressure"]), "volume_m3": scales.to_si("volume", loads["volume"])}
     mesh = meshio.Mesh(
-        revolution.vectors(profile["rho"], profile["eta"]),
+        shown_length(equilibrium) * revolution.vectors(profile["rho"], profile["eta"]),
         cells,
         point_data=surface_data(equilibrium, profile, revolution),
         cell_data={name: [np.full(len(c), load) for _, c in cells] for name, load in loads.items()},
@@ -203,7 +211,8 @@ def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolut
     """What is known at the points of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
     parameters = equilibrium.potential.space.node_parameters()
     R, Z = equilibrium.scene.mesh.position(parameters)
-    data: dict[str, NDArray[Any]] = {"displacement": revolution.vectors(profile["rho"] - R, profile["eta"] - Z)}
+    moved = revolution.vectors(profile["rho"] - R, profile["eta"] - Z)
+    data: dict[str, NDArray[Any]] = {"displacement": shown_length(equilibrium) * moved}
     data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
     if equilibrium.scene.analysis.wrinkling:
         data["zone"] = revolution.scalars(equilibrium.zones().numbers(parameters).astype(np.int32))

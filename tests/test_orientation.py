@@ -146,3 +146,20 @@ def test_surfaces_face_the_way_the_pressure_pushes(height: float, tmp_path: Path
     mesh = meshio.read(tmp_path / "a.stl")
     a, b, c = (mesh.points[mesh.cells_dict["triangle"][:, k]].astype(float) for k in range(3))
     assert float((np.cross(b - a, c - a)[:, 2] / 2 * (a + b + c)[:, 2] / 3).sum()) == pytest.approx(2.0, rel=2e-2)
+
+
+def test_results_of_other_signs_are_refused(tmp_path: Path) -> None:
+    """Files of versions that counted a bowl as negative lack the attribute that says how volumes count."""
+    import h5py
+
+    for height, refused in ((-0.5, True), (0.5, False)):
+        branch = fm.inflate(fm.Scene(material=NEO_HOOKEAN, mesh=fm.cap(height, 8)), volumes=[1.5])
+        branch.save(tmp_path / "a.nc")
+        assert fm.load(tmp_path / "a.nc")[0].volume == branch[0].volume
+        with h5py.File(tmp_path / "a.nc", "a") as file:
+            del file.attrs["inside"]
+        if refused:
+            with pytest.raises(fm.InputError, match="whose inside is above it as negative"):
+                fm.load(tmp_path / "a.nc")
+        else:
+            assert fm.load(tmp_path / "a.nc")[0].volume == branch[0].volume

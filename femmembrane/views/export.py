@@ -30,7 +30,7 @@ import numpy as np
 from ..errors import InputError, unknown_name
 from ..results.store import replace_file
 from .stage import place_of
-from .vtk import FIELDS, Array, Revolution, smooth_profile, shown_length, surface_data, write_surface, write_vtk
+from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium

@@ -38,6 +38,7 @@ SHAPES: dict[str, tuple[np.ndarray, tuple[str, str], float]] = {
     "vessel": (arc(np.pi / 2, np.pi), ("clamped", "clamped"), 1.5),
     "shallow bowl": (arc(0.7 * np.pi, np.pi) - [0.0, np.cos(0.7 * np.pi)], ("clamped", "clamped"), 1.0),
     "cone": (np.stack([SHARE, 0.4 * (1 - SHARE)], axis=1), ("hub", "clamped"), 1.0),
+    "cone between walls": (np.stack([SHARE, 0.4 * (1 - SHARE)], axis=1), ("axial", "radial"), 1.0),
     "steep cone": (np.stack([SHARE, 2.0 * (1 - SHARE)], axis=1), ("hub", "clamped"), 1.0),
     "cone of 45 degrees": (np.stack([SHARE, 1 - SHARE], axis=1), ("clamped", "clamped"), 1.0),
     "bellows": (BELLOWS, ("hub", "clamped"), 6.0),

@@ -110,7 +110,7 @@ def _check(lines: Lines) -> None:
     for blocks in lines.cells.values():
         for cells, _ in blocks:
             if cells.min() < 0 or cells.max() >= len(lines.points):
-                raise UnreadableError(f"a line has the point number {int(cells.max())}, where there are {len(lines.points)} points")
+                raise UnreadableError("a line has a point that is not in the file")
 
 
 def count(value: Any, what: str, most: int = MOST_NUMBERS) -> int:

@@ -145,9 +145,12 @@ class _Reader:
     def _read_elements(self) -> None:
         if self.version[0] == 2:
             total = count(self._first(), "elements")
+            if not self.binary:
+                self._keep_single(total)
+                return
             read = 0
             while read < total:
-                read += self._old_elements()
+                read += self._keep_many()
             return
         blocks = count(self._values(self.size, 4 if self.version == (4, 1) else 2)[0], "blocks of elements")
         for _ in range(blocks):
@@ -159,23 +162,34 @@ class _Reader:
             rows = whole(self._values(self.size if self.version == (4, 1) else "i4", width * n), "nodes").reshape(n, width)
             self._keep(kind, rows[:, 1:], self.of_curve.get(entity, []) if dimension == 1 else [])
 
-    def _old_elements(self) -> int:
-        """Elements of version 2 that follow one head: one, of binary files more; returns how many."""
-        if self.binary:
-            kind, many, tags = self._values("i4", 3).tolist()
-            if many < 1:
-                raise UnreadableError("a block of elements is empty")
-            count(tags, "tags of an element", 1000)
-            rows = self._values("i4", count(many * (1 + tags + self._width(kind)), "numbers of elements")).reshape(many, -1)
-        else:
-            _, kind, tags = (int(v) for v in whole(self._values("f8", 3), "elements"))
-            many = 1
-            rows = whole(self._values("f8", count(tags, "tags of an element", 1000) + self._width(kind)), "nodes")[None]
-            rows = np.insert(rows, 0, 0, axis=1)
+    def _keep_many(self) -> int:
+        """Elements of one kind in a binary file of version 2; returns how many."""
+        kind, many, tags = self._values("i4", 3).tolist()
+        if many < 1:
+            raise UnreadableError("a block of elements is empty")
+        count(tags, "tags of an element", 1000)
+        rows = self._values("i4", count(many * (1 + tags + self._width(kind)), "numbers of elements")).reshape(many, -1)
         groups = np.abs(rows[:, 1]) if tags else np.zeros(many, dtype=np.int64)
-        for group in np.unique(groups):
-            self._keep(kind, rows[groups == group, 1 + tags :], [int(group)] if group else [])
+        for group in np.unique(groups).tolist():
+            self._keep(kind, rows[groups == group, 1 + tags :], [group] if group else [])
         return many
+
+    def _keep_single(self, total: int) -> None:
+        """Elements of a file of version 2 in text, each with its number, its kind, its tags and its nodes."""
+        values, place = whole(self.numbers[self.read :], "elements").tolist(), 0
+        rows: dict[tuple[int, int], list[list[int]]] = {}
+        for _ in range(total):
+            if place + 3 > len(values):
+                raise UnreadableError("a section ends before its last number")
+            kind, tags = values[place + 1], count(values[place + 2], "tags of an element", 1000)
+            first = place + 3 + tags
+            group = abs(values[place + 3]) if tags and place + 3 < len(values) else 0
+            place = first + self._width(kind)
+            if place > len(values):
+                raise UnreadableError("a section ends before its last number")
+            rows.setdefault((kind, group), []).append(values[first:place])
+        for (kind, group), nodes in rows.items():
+            self._keep(kind, np.array(nodes, dtype=np.int64), [group] if group else [])
 
     def _width(self, kind: int) -> int:
         if kind not in _SIZES:

@@ -32,14 +32,16 @@ def read(path: Path) -> Lines:
     if grid is None:
         raise UnreadableError(f"it holds {kind[:40] or 'nothing'}; UnstructuredGrid and PolyData are allowed")
     lines = Lines(np.zeros((0, 3)))
+    points, first = [lines.points], 0
     for piece in grid.findall("Piece"):
-        first = len(lines.points)
         own = _unstructured(reader, piece) if kind == "UnstructuredGrid" else _polydata(reader, piece)
-        lines.points = np.concatenate([lines.points, own.points])
+        points.append(own.points)
         lines.others |= own.others
         for blocks in own.cells.values():
             for cells, _ in blocks:
                 lines.add(np.where(cells < len(own.points), cells + first, -1))
+        first += len(own.points)
+    lines.points = np.concatenate(points)
     return lines
 
 

@@ -36,7 +36,8 @@ def read(path: Path) -> Lines:
     if not grids:
         raise UnreadableError("it has no grid")
     lines = Lines(np.zeros((0, 3)))
-    read_before: dict[str, int] = {}
+    read_before: dict[str, tuple[int, int]] = {}
+    points, total = [lines.points], 0
     for grid in grids:
         topology, geometry = (_part(root, grid, name) for name in ("Topology", "Geometry"))
         if topology is None or geometry is None:
@@ -44,15 +45,18 @@ def read(path: Path) -> Lines:
         # grids over one set of points, such as a mesh and its parts, share them
         key = ElementTree.tostring(geometry, encoding="unicode").strip()
         if key not in read_before:
-            read_before[key] = len(lines.points)
-            lines.points = np.concatenate([lines.points, _points(path, geometry)])
+            points.append(_points(path, geometry))
+            read_before[key] = total, len(points[-1])
+            total += len(points[-1])
+        first, many = read_before[key]
         own = Lines(lines.points)
         _add_cells(own, path, topology)
         lines.others |= own.others
         name = [grid.get("Name", "")] if len(grids) > 1 and grid.get("Name") else []
         for blocks in own.cells.values():
             for cells, _ in blocks:
-                lines.add(cells + read_before[key], name)
+                lines.add(np.where(cells < many, cells + first, -1), name)
+    lines.points = np.concatenate(points)
     return lines
 
 

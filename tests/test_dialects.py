@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.discretization.dialects import READERS
 from femmembrane.discretization.mesh_files import FORMATS
 
 DATA = Path(__file__).parent / "data"
@@ -269,7 +270,7 @@ def circle(turns: np.ndarray, aspect: float = 3.0) -> np.ndarray:
     return np.stack([aspect + np.sin(turns), np.cos(turns)], axis=1)
 
 
-def test_a_ring_that_closes_but_for_round_off_is_closed() -> None:
+def test_a_ring_that_closes_but_for_round_off_is_closed(tmp_path: Path) -> None:
     """61 points whose ends are 1.1e-16 apart: P = 0.5 gives the V of the closed ring, and not of one clamped at a slit."""
     points = circle(2 * np.pi * np.arange(61) / 60)
     points[-1] = points[0] + np.array([0.0, -1.1102230246251565e-16])
@@ -282,7 +283,9 @@ def test_a_ring_that_closes_but_for_round_off_is_closed() -> None:
     assert exact == curve
     found = [fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=mesh), pressure=0.5).volume for mesh in (curve, exact)]
     assert found[0] == found[1]
-    branch = fm.Branch(fm.Scene(material=fm.NeoHookean(), mesh=curve), ())
+    branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=curve), volumes=[found[0]])
+    branch.save(tmp_path / "branch.nc")
+    assert fm.load(tmp_path / "branch.nc").notes == branch.notes
     assert branch.notes[0] == "mesh: the ends of the curve, 1.1e-16 apart, were joined: it is closed"
 
 
@@ -412,6 +415,12 @@ def _fuzz(folder: Path, number: int, capfd: pytest.CaptureFixture[str], seed: in
             path.write_bytes(whole)
     assert min(outcomes.values()) > number / 20, outcomes
     assert capfd.readouterr() == ("", "")
+
+
+def test_samples_are_read_when_they_are_whole(tmp_path: Path) -> None:
+    files = [path for path in samples(tmp_path) if path.suffix != ".h5"]
+    assert [path.name for path in files if _refusal(path) is not None] == []
+    assert {path.suffix for path in files} == set(READERS)
 
 
 def test_damaged_files_are_read_or_refused_in_words(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -119,7 +119,7 @@ class Potential:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with _casadi_answers_numpy():
-            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, tuple(columns), space.lids, forces)
+            self.symbols, self.terms = _point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
         self.n_points = self.point_data.shape[1]
         self._force_shape = (2, 4 * space.n_quadrature, space.n_elements)
 
@@ -612,7 +612,7 @@ def _point_expressions(
     sources: Sequence[Source],
     loads: Sequence[Load],
     columns: Sequence[str],
-    lids: bool,
+    space: Space,
     forces: tuple[Any, Any] | None,
 ) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
     """Symbols (data, local, parameters) and the weighted densities with their gradients at one point; what is no column of data is 0."""
@@ -632,10 +632,11 @@ def _point_expressions(
     gradient = area * ca.mtimes(slopes.T, stress)
     bending = sum((stress[k] * ca.jacobian(slopes[k, :].T, local) for k in range(2)), ca.SX(4, 4))
     hessian = area * (ca.mtimes([slopes.T, tangent, slopes]) + bending)
-    enclosed = lidded_volume_density(R + u, Z_x + w_x) if lids else volume_density(R + u, R_x + u_x, Z + w)
+    enclosed = lidded_volume_density(R + u, Z_x + w_x) if space.lids else volume_density(R + u, R_x + u_x, Z + w)
     if "wall" in columns:
         enclosed = enclosed + wall_density(data[columns.index("wall")], data[columns.index("wall_x")], w, w_x)
-    volume = weight * enclosed
+    inside = weight if space.side > 0 else -weight
+    volume = inside * enclosed
     magnetic = ca.SX(0)
     if sources and scene.susceptibility:
         magnetic = area * magnetic_energy_density(sources, scene.susceptibility, R + u, Z + w)
@@ -644,7 +645,7 @@ def _point_expressions(
         gradient, hessian = gradient + first, hessian + second
     load = ca.SX(0)
     if loads:
-        load = area * over_reference(loads, R + u, Z + w) + weight * (R + u) * (R_x + u_x) * over_projection(loads, Z + w)[0]
+        load = area * over_reference(loads, R + u, Z + w) + inside * (R + u) * (R_x + u_x) * over_projection(loads, Z + w)[0]
         if forces is not None:
             hub, hub_x = (data[columns.index(c)] for c in ("hub", "hub_x"))
             load += weight / (2 * math.pi) * hub_density(forces, hub, hub_x, Z + w, Z_x + w_x)

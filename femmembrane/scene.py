@@ -76,7 +76,7 @@ SHAPES: dict[str, Any] = {
     "curve": Curve,
 }
 #: keys of [mesh] beside the file that holds the meridian
-FILE_KEYS = ("divisions", "first", "last")
+FILE_KEYS = ("group", "divisions", "first", "last")
 CONTROLS = ("volume", "pressure", "height", "arc-length")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
@@ -144,6 +144,8 @@ class Run:
         Where an arc-length run ends: one of ``volume``, ``pressure``, ``center_height``.
     max_steps : int
         Most steps of an arc-length run.
+    direction : {1, -1}
+        Whether an arc-length run sets out to larger or to smaller volumes.
     solver : {"ipopt", "newton"}
         Who solves under volume and pressure control; a height and arc length always take the bordered Newton corrector.
     at_limit : {"stop", "jump"}
@@ -163,6 +165,7 @@ class Run:
     values: tuple[float, ...] | None = None
     until: Mapping[str, float] | None = None
     max_steps: int = _MAX_STEPS
+    direction: int = 1
     solver: str = "ipopt"
     at_limit: str = "stop"
 
@@ -209,6 +212,10 @@ class Run:
                 raise InputError(f"run.{name}", None, f"missing; {advice}")
         if self.max_steps != _MAX_STEPS and not by_length:
             raise InputError("run.max_steps", self.max_steps, f"only arc-length control takes it; {advice}")
+        if isinstance(self.direction, bool) or self.direction not in (1, -1):
+            raise InputError("run.direction", self.direction, "1 (towards larger volumes) or -1 is allowed")
+        if self.direction != 1 and not by_length:
+            raise InputError("run.direction", self.direction, f"only arc-length control takes it; {advice}")
 
 
 @dataclass(frozen=True)
@@ -408,6 +415,8 @@ class Scene:
             del tables["membrane"]["radius_to_thickness"]
         if self.run and self.run.control != "arc-length":
             del tables["run"]["max_steps"]
+        if self.run and self.run.direction == 1:
+            del tables["run"]["direction"]
         plain: dict[str, Any] = _plain(tables)
         return {name: table for name, table in plain.items() if table not in ("", {}, [])}
 
@@ -524,7 +533,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
-    keys["mesh"] |= {"shape", "file"} | arguments(*SHAPES.values())
+    keys["mesh"] |= {"shape", "file", *FILE_KEYS} | arguments(*SHAPES.values())
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
 
 

@@ -99,6 +99,54 @@ def test_xdmf_in_vtk_s_reader(folder: Path) -> None:
         np.testing.assert_allclose((points - moved)[:, 2], 0, atol=1e-14)
 
 
+def test_xdmf_and_vtu_in_meshio_and_pyvista(folder: Path, tmp_path: Path) -> None:
+    """A branch by meshio's reader of time series, one equilibrium as a mesh."""
+    import meshio
+
+    cells = {"triangle": SECTORS, "quad": (NODES - 2) * SECTORS}
+    with meshio.xdmf.TimeSeriesReader(folder / "export.xdmf") as reader:
+        points, blocks = reader.read_points_cells()
+        assert {block.type: len(block.data) for block in blocks} == cells
+        assert points[0, 2] == pytest.approx(branch()[0].center_height, rel=1e-12)
+        assert reader.num_steps == 3
+        for step, equilibrium in enumerate(branch()):
+            time, data, _ = reader.read_data(step)
+            assert time == step
+            np.testing.assert_array_equal(data["stretch_2"][1::SECTORS], equilibrium.profile()["stretch_2"][1:])
+    fm.export(branch()[1], tmp_path / "one.xdmf")
+    fm.export(branch()[1], tmp_path / "one.vtu")
+    for name in ("one.xdmf", "one.vtu"):
+        mesh = meshio.read(tmp_path / name)
+        assert {kind: len(mesh.cells_dict[kind]) for kind in cells} == cells
+        assert mesh.points[0, 2] == pytest.approx(branch()[1].center_height, rel=1e-12)
+        pyvista = pytest.importorskip("pyvista")
+        grid = pyvista.get_reader(tmp_path / name).read() if name.endswith(".vtu") else None
+        if grid is not None:
+            assert grid.n_points == len(mesh.points)
+            np.testing.assert_array_equal(grid["stretch_1"], mesh.point_data["stretch_1"])
+
+
+def test_lengths_are_in_m_where_the_scene_has_scales(tmp_path: Path) -> None:
+    import meshio
+
+    scales = fm.Scales(radius=0.05, thickness=1e-4, shear_modulus=1e5)
+    eq = fm.equilibrium(disc_scene(elements=4).replace(scales=scales), volume=2.0)
+    height = 0.05 * eq.center_height
+    for suffix in (".vtu", ".xdmf", ".stl", ".obj"):
+        fm.export(eq, tmp_path / f"a{suffix}")
+        mesh = meshio.read(tmp_path / f"a{suffix}")
+        assert np.ptp(mesh.points[:, 2]) == pytest.approx(height, rel=1e-6)
+        if suffix in (".vtu", ".xdmf"):
+            assert mesh.point_data["displacement"][0, 2] == pytest.approx(height, rel=1e-12)
+    mesh = meshio.read(tmp_path / "a.vtu")
+    assert mesh.cell_data["volume_m3"][0][0] == pytest.approx(2.0 * 0.05**3, rel=1e-12)
+    assert mesh.cell_data["pressure_pa"][0][0] == pytest.approx(scales.to_si("pressure", eq.pressure), rel=1e-12)
+    fm.export(eq, tmp_path / "a.csv")
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        row = next(csv.DictReader(file))
+    assert (float(row["eta"]), float(row["eta_m"])) == (eq.center_height, pytest.approx(height, rel=1e-12))
+
+
 def test_stl_encloses_the_volume(folder: Path) -> None:
     """Its triangles face the way the pressure pushes, and enclose the volume with the plane of the rim."""
     from vtkmodules.vtkIOGeometry import vtkSTLReader

@@ -24,7 +24,7 @@ SHAPES = {
     "disc": (fm.disc(12), 1.0, "clamped"),
     "annulus": (fm.annulus(0.3, 12), 1.0, "hub"),
     "cap": (fm.cap(0.5, 12), 1.5, "clamped"),
-    "inverted cap": (fm.cap(-0.5, 12), -1.5, "clamped"),
+    "bowl": (fm.cap(-0.5, 12), 1.5, "clamped"),
     "sphere": (fm.sphere(12), 8.0, "clamped"),
     "tube": (fm.cylinder(3.0, 12, top="hub"), 14.0, "hub"),
     "torus": (fm.torus(3.0, 12), 90.0, "clamped"),
@@ -188,7 +188,6 @@ BAD_FILES = {
     "one node twice": ([(0, 0), (1, 0), (2, 0), (3, 0)], [(0, 1), (1, 1), (1, 2)], "cell 1 has no length"),
     "not a number": ([(0, 0), (1, np.nan), (2, 0), (3, 0)], LINE, "cell 1 has the point (1, nan)"),
     "infinite": ([(0, 0), (1, 0), (np.inf, 0), (3, 0)], LINE, "finite numbers"),
-    "all but a pole": ([(1e-14, 0), (1, 0), (2, 0), (3, 0)], LINE, "cell 0 ends at R = 1e-14"),
     "a knot": ([(1, 0), (2, 0), (2, 1), (1, 0)], [(0, 1), (1, 2)], None),
 }
 
@@ -209,7 +208,7 @@ def test_bad_curves_name_the_cell(name: str, tmp_path: Path) -> None:
 def test_bad_files(tmp_path: Path, silent: None) -> None:
     _write(tmp_path / "triangles.vtu", [(0, 0), (1, 0), (1, 1)], [(0, 1, 2)], "triangle")
     _write(tmp_path / "back.vtu", [(0, 0), (1, 0), (0.9, 0)], [(0, 1, 2)], "line3")
-    meshio.Mesh(np.array([[0, 0, 0], [1, 0, 1.0]]), [("line", np.array([(0, 1)]))]).write(tmp_path / "space.vtu")
+    meshio.Mesh(np.array([[0, 0, 0], [1, 0.5, 1.0]]), [("line", np.array([(0, 1)]))]).write(tmp_path / "space.vtu")
     (tmp_path / "text.vtu").write_text("no mesh", encoding="utf-8")
     (tmp_path / "text.msh").write_text("no mesh", encoding="utf-8")
     for name, text in {

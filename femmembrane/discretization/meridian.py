@@ -2,6 +2,16 @@
 
 A meridian is divided into elements at :meth:`Meridian.breakpoints`; everything else (kinematics, energies, mass) is written for a
 general curve, so a new shape is a new class here and nothing more.
+
+Inside
+------
+The pressure pushes from inside. Which side that is follows from the reference shape by one rule, whatever the direction in which the
+meridian runs, and whichever end of it is up (:func:`side`):
+
+* a shape that encloses a volume, by itself or with flat lids across its ends, has its inside there: V > 0 at rest, and P > 0 inflates it;
+* of a flat shape, and of one that encloses nothing, inside is below: P > 0 lifts it, and V counts what is below the membrane.
+
+A dome is so filled from below and a bowl from above, and a liquid with gamma > 0 (:class:`~femmembrane.Hydrostatic`) is heavy in both.
 """
 
 from __future__ import annotations
@@ -9,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -26,6 +37,10 @@ ELEMENTS = 64
 LEAST_ACCURACY, MOST_ACCURACY = 0.1, 1e-12
 #: a hundred times more than a large machine has room for
 MAX_ELEMENTS = 10**8
+#: a length or a volume below this part of the size of the meridian may be round-off of single precision
+ROUND_OFF = 1e-6
+#: a length below this part of the size of the meridian is round-off of double precision
+LEAST_LENGTH = 1e-12
 #: ratios of sizes reach from one over this to this: beyond, the smallest elements drown in round-off
 MAX_RATIO = 1e6
 
@@ -195,6 +210,30 @@ def _positive(key: str, value: Any, least: float, most: float, what: str) -> Non
         raise InputError(key, value, f"a number from {least:g} to {most:g} is allowed{what}")
 
 
+@lru_cache(maxsize=64)
+def side(mesh: Meridian) -> int:
+    """1 where the inside of a meridian is on its right as it runs, so that the pressure pushes to its left; -1 where it is on its left.
+
+    See the rule at the top of this module. The volume that decides is that between the meridian and flat lids across its ends.
+    """
+    ends = mesh.breakpoints()
+    s = ends[:-1] + (_GAUSS[0][:, None] + 1) / 2 * np.diff(ends)
+    R, Z = mesh.position(s)
+    _, Z_s = mesh.tangent(s)
+    enclosed = -float((_GAUSS[1][:, None] / 2 * np.diff(ends) * R**2 * Z_s).sum())  # over pi
+    size = extent(R, Z)
+    return -1 if enclosed < -ROUND_OFF * size**3 else 1
+
+
+#: points and weights that integrate the volume of a parabolic cell exactly
+_GAUSS = np.polynomial.legendre.leggauss(6)
+
+
+def extent(R: Array, Z: Array) -> float:
+    """Size of a meridian: its largest radius, or its height if that is larger."""
+    return float(max(np.max(np.abs(R)), np.ptp(Z)))
+
+
 def check_elements(value: Any, least: int = 1) -> int:
     """A number of elements, or InputError."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= MAX_ELEMENTS:
@@ -214,8 +253,10 @@ def geometric_ends(elements: int, ratio: float) -> Array:
     if ratio == 1 or elements == 1:
         return np.linspace(0.0, 1.0, elements + 1)
     # (q^k - 1)/(q^n - 1) with the quotient q of neighbouring sizes; expm1 keeps the digits of the first, smallest ends
-    growth = np.arange(elements + 1) * (math.log(ratio) / (elements - 1))
-    return np.expm1(growth) / math.expm1(growth[-1])
+    share = np.expm1(np.arange(elements + 1) * (math.log(ratio) / (elements - 1)))
+    ends = share / share[-1]
+    ends[0], ends[-1] = 0.0, 1.0
+    return ends
 
 
 def graded_alike(elements: int, ratio: float, other: int) -> float:
@@ -237,8 +278,9 @@ def _radii(values: Any) -> tuple[float, ...]:
     for k, end in enumerate(ends):
         if not is_number(end):
             raise InputError(f"mesh.radii[{k}]", end, "a finite number is allowed")
-    if len(ends) < 2 or ends[0] != 0 or ends[-1] != 1:
+    if len(ends) < 2 or not abs(ends[0]) <= LEAST_LENGTH or not abs(ends[-1] - 1) <= LEAST_LENGTH:
         raise InputError("mesh.radii", ends, allowed)
+    ends = (0.0, *ends[1:-1], 1.0)  # whoever computes them meets both ends to round-off only
     for k in range(1, len(ends)):
         if not ends[k - 1] < ends[k]:
             raise InputError(f"mesh.radii[{k}]", ends[k], f"a number above the one before ({ends[k - 1]:.9g}) is allowed")

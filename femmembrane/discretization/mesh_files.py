@@ -1,23 +1,22 @@
 """Meridians given by points: from a mesh file, or from an array.
 
-A file holds line cells with points (R, Z) in their first two coordinates (a third one must be zero), in any order and direction; cells of
-other kinds, and points that no cell uses, are left out. Cells of three nodes (``line3``) are arcs of parabolas. What is read is one curve,
-put in an order of its own, so that the order in the file plays no part:
+A file (see :mod:`.dialects`) holds line cells in any order and direction with points (R, Z) as (x, y) where every z is zero, else as (x, z)
+where every y is; cells of other kinds, and points that no cell uses, are left out. Cells of three nodes (``line3``) are arcs of parabolas.
+Lines of one physical group are chosen by its name. Points that agree to round-off are one (:mod:`.merging`). What is read is one curve, put
+in an order of its own, so that the order in the file plays no part:
 
 * a closed curve, and one with a pole at both ends, starts at its top and runs so that the enclosed volume is on its right;
 * with one pole it starts there;
 * else it starts at the end nearer to the axis, or, where its ends differ more in height than in radius, at the upper one.
 
-The pressure then pushes to the left of the curve: out of a closed one, and up where it runs away from the axis in a plane.
+Which side is inside follows from the shape and not from this order (:func:`.meridian.side`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass, replace
-from io import StringIO
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from os import PathLike
 from pathlib import Path
@@ -26,14 +25,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from .meridian import Array, Meridian, check_elements
+from ..errors import InputError, unknown_name
+from .dialects import READERS, Lines, UnreadableError, read_lines
+from .merging import mended, merged
+from .meridian import LEAST_LENGTH, ROUND_OFF, Array, Meridian, check_elements, extent
 from .supports import POLE, SUPPORTS, Support, check_support
 
-#: kinds of files that are read and written, by their suffix; with the format that meshio is to write
+#: kinds of files that are written, and read as well, by their suffix; with the format that meshio is to write
 FORMATS = {".vtu": "vtu", ".msh": "gmsh", ".vtk": "vtk", ".xdmf": "xdmf"}
-#: a point closer to the axis than this, over the size of the curve, is on it
-_ON_AXIS = 1e-12
 #: points and weights for the length of a curved cell
 _GAUSS = np.polynomial.legendre.leggauss(12)
 
@@ -53,6 +52,8 @@ class Curve:
         Number of elements that a cell is divided into.
     first, last : str
         How the ends are held, see :mod:`.supports`; an end on the axis is a pole, and a closed curve has none.
+    repaired : sequence of str
+        What was done about points that agree to round-off only, in words; what is done here is added. Nothing else depends on it.
 
     Raises
     ------
@@ -65,9 +66,11 @@ class Curve:
     divisions: int = 1
     first: str = "clamped"
     last: str = "clamped"
+    repaired: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", _points(self.points))
+        object.__setattr__(self, "repaired", _remarks(self.repaired))
         if not isinstance(self.curved, (bool, np.bool_)):
             raise InputError("mesh.curved", self.curved, "true or false is allowed")
         object.__setattr__(self, "curved", bool(self.curved))
@@ -77,6 +80,9 @@ class Curve:
             raise InputError("mesh.divisions", self.divisions, error.allowed) from None
         for name in ("first", "last"):
             check_support(f"mesh.{name}", getattr(self, name))
+        points, remarks = mended(np.array(self.points), 2 if self.curved else 1)
+        object.__setattr__(self, "points", _tuples(points))
+        object.__setattr__(self, "repaired", self.repaired + remarks)
         _check_curve(self)
         object.__setattr__(self, "points", _tuples(_directed(np.array(self.points), self.curved)))
 
@@ -190,17 +196,21 @@ def meridian_from_points(
     """
     array = _array(points)
     if cells is None:
-        k = np.arange(len(array) - 1)
-        cells = np.stack([k, k + 1], axis=1)
+        return Curve(points=_tuples(array), divisions=divisions, first=first, last=last)
     return _ordered(array, np.asarray(cells), divisions=divisions, first=first, last=last)
 
 
-def read_meridian(path: str | PathLike[str], *, divisions: int = 1, first: str = "clamped", last: str = "clamped") -> Curve:
-    """A meridian from a mesh file (.vtu, .msh, .vtk, .xdmf), see :mod:`.mesh_files`.
+def read_meridian(
+    path: str | PathLike[str], *, group: str | int | None = None, divisions: int = 1, first: str = "clamped", last: str = "clamped"
+) -> Curve:
+    """A meridian from a mesh file (.vtu, .msh, .vtk, .xdmf, .vtp, .inp), see :mod:`.mesh_files`.
 
     Parameters
     ----------
     path : path
+    group : str or int, optional
+        The physical group of the meridian: its name, or its number where it has none. In .msh a physical curve, in .inp a set of elements,
+        in .xdmf a grid of several. Left out: all lines of the file.
     divisions, first, last
         As for :class:`Curve`.
 
@@ -209,37 +219,69 @@ def read_meridian(path: str | PathLike[str], *, divisions: int = 1, first: str =
     InputError
         When the file cannot be read, or holds no meridian, with the number of the cell.
     """
-    import meshio
-
     path = Path(path)
-    if path.suffix.lower() not in FORMATS:
-        raise InputError("mesh.file", str(path), "the name of a mesh file is allowed, which ends in " + ", ".join(FORMATS))
+    if path.suffix.lower() not in READERS:
+        raise InputError("mesh.file", str(path), "the name of a mesh file is allowed, which ends in " + ", ".join(READERS))
     if not path.is_file():
         raise InputError("mesh.file", str(path), "there is no such file; the path of a mesh file is allowed (from the folder of the scene)")
+    if group is not None and (isinstance(group, bool) or not isinstance(group, (str, int))):
+        raise InputError("mesh.group", group, "the name of a group of lines is allowed")
     try:
-        # what its readers have to say goes into the error
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-            mesh = meshio.read(path, file_format=FORMATS[path.suffix.lower()])
-    except (Exception, SystemExit) as error:  # its readers raise what they like, and some end the program
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError("mesh.file", str(path), f"cannot be read as a mesh ({reason[:200]})") from None
-    kinds = {
-        kind: np.concatenate([block.data for block in mesh.cells if block.type == kind])
-        for kind in ("line", "line3")
-        if kind in mesh.cells_dict
-    }
-    if len(kinds) != 1:
-        found = ", ".join(sorted(mesh.cells_dict)) or "none"
-        raise InputError("mesh.file", str(path), f"line cells of one kind are allowed, line or line3; cells in the file: {found}")
-    points = np.asarray(mesh.points, dtype=float)
-    if points.shape[1] == 3 and points[:, 2].any():
-        raise InputError("mesh.file", str(path), "points (R, Z, 0) are allowed: a third coordinate that is not zero is no meridian's")
+        lines = read_lines(path)
+    except UnreadableError as error:
+        raise InputError("mesh.file", str(path), f"cannot be read as a mesh: {error}") from None
+    except OSError as error:
+        raise InputError("mesh.file", str(path), f"cannot be read ({error.strerror or error})") from None
+    cells = _chosen(str(path), lines, group)
     try:
-        return _ordered(points[:, :2], *kinds.values(), divisions=divisions, first=first, last=last)
+        return _ordered(*_in_plane(lines.points, cells), divisions=divisions, first=first, last=last)
     except InputError as error:
         if error.key != "mesh.points":
             raise
-        raise InputError("mesh.file", str(path), error.allowed) from None
+        advice = "; [mesh] group chooses one of its groups: " + _listed(lines.groups) if group is None and lines.groups else ""
+        raise InputError("mesh.file", str(path), error.allowed + advice) from None
+
+
+def _chosen(path: str, lines: Lines, group: str | int | None) -> NDArray[np.int64]:
+    """The cells of a group, or all."""
+    if group is not None and str(group) not in lines.groups:
+        if not lines.groups:
+            raise InputError("mesh.group", group, "the file has no groups of lines; leave it out")
+        raise unknown_name("mesh.group", str(group), lines.groups)
+    kinds = {}
+    for size, blocks in lines.cells.items():
+        chosen = [cells for cells, groups in blocks if group is None or str(group) in groups]
+        if chosen:
+            kinds[size] = np.concatenate(chosen)
+    if len(kinds) != 1:
+        found = ", ".join(sorted({2: "line", 3: "line3"}[size] for size in kinds) + sorted(lines.others)) or "none"
+        advice = ""
+        if not kinds and any(name.startswith(("triangle", "quad", "polygon")) for name in lines.others):
+            advice = "; of a surface of revolution save its meridian alone, the curve in which it meets the half plane y = 0, x >= 0"
+        elif len(kinds) > 1 and lines.groups:
+            advice = "; [mesh] group chooses one of its groups: " + _listed(lines.groups)
+        allowed = f"line cells of one kind are allowed, line or line3; cells in the file: {found}{advice}"
+        raise InputError("mesh.file", path, allowed)
+    return next(iter(kinds.values()))
+
+
+def _listed(names: set[str]) -> str:
+    shown = sorted(names)
+    return ", ".join(shown[:20]) + (" and more" if len(shown) > 20 else "")
+
+
+def _in_plane(points: Array, cells: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """The points that cells use as (R, Z), and the cells by their new numbers."""
+    used, inverse = np.unique(cells, return_inverse=True)
+    points, cells = points[used], inverse.reshape(cells.shape)
+    if points.shape[1] == 2:
+        return points, cells
+    size = np.nanmax(np.abs(points), initial=0.0)
+    flat = np.abs(points).max(axis=0) <= ROUND_OFF * size
+    if not (flat[2] or flat[1]) and np.isfinite(points).all():
+        what = "points (R, Z, 0) or (R, 0, Z) are allowed: a third coordinate that is not zero is no meridian's"
+        raise InputError("mesh.points", "points", what)
+    return points[:, [0, 1] if flat[2] or not flat[1] else [0, 2]], cells
 
 
 def write_meridian(mesh: Meridian, path: str | PathLike[str], *, curved: bool = True) -> None:
@@ -309,6 +351,12 @@ def _points(points: Any) -> tuple[tuple[float, float], ...]:
     return tuple((float(R), float(Z)) for R, Z in rows.tolist())
 
 
+def _remarks(remarks: Any) -> tuple[str, ...]:
+    if isinstance(remarks, str) or not isinstance(remarks, Sequence) or not all(isinstance(text, str) for text in remarks):
+        raise InputError("mesh.repaired", remarks, "a list of texts is allowed, as a program wrote it; leave it out")
+    return tuple(remarks)
+
+
 def _refuse(cell: int, what: str) -> InputError:
     return InputError("mesh.points", f"cell {cell}", what)
 
@@ -318,7 +366,7 @@ def _check_curve(curve: Curve) -> None:
     points, step = np.array(curve.points), 2 if curve.curved else 1
     if curve.curved and len(points) % 2 == 0:
         raise InputError("mesh.points", f"{len(points)} points", "an odd number of points is allowed for curved cells")
-    size = np.ptp(points, axis=0).max()
+    size = extent(*points.T)
     for k, (R, Z) in enumerate(points):
         if not (math.isfinite(R) and math.isfinite(Z)):
             cell = min(k // step, curve._n_cells - 1)
@@ -328,16 +376,16 @@ def _check_curve(curve: Curve) -> None:
         if R < 0:
             raise _refuse(cell, f"cell {cell} has the point ({R:g}, {Z:g}); radii >= 0 are allowed")
         inside = 0 < k < len(points) - 1
-        if (inside or curve.closed) and _ON_AXIS * size >= R:
+        if (inside or curve.closed) and LEAST_LENGTH * size >= R:
             raise _refuse(cell, f"cell {cell} touches the axis at ({R:g}, {Z:g}) inside the curve; only ends may (poles)")
-        if not inside and 0 < R <= _ON_AXIS * size:
+        if not inside and 0 < R <= LEAST_LENGTH * size:
             raise _refuse(cell, f"cell {cell} ends at R = {R:g}; 0 is allowed (a pole), or a radius that is no round-off")
     if curve.closed and curve._n_cells < 3:
         raise InputError("mesh.points", f"{curve._n_cells} cells", "three or more cells are allowed in a closed curve")
     a, m, b = curve._nodes
     for cell in range(curve._n_cells):
         length = float(np.hypot(*(b[cell] - a[cell])))
-        if not length > _ON_AXIS * size:
+        if not length > LEAST_LENGTH * size:
             raise _refuse(cell, f"cell {cell} has no length, at ({a[cell][0]:g}, {a[cell][1]:g})")
         # the slope of a parabola must not turn back: its ends and its middle point say all
         off = float(np.dot(m[cell] - (a[cell] + b[cell]) / 2, b[cell] - a[cell])) / length**2
@@ -360,11 +408,12 @@ def _ordered(points: Array, cells: NDArray[Any], **rest: Any) -> Curve:
         or cells.max() >= len(points)
     ):
         raise InputError("mesh.points", "cells", "cells of two or three existing points each are allowed")
+    cells, remarks = merged(points, cells)
     chain = _chain(cells.tolist())
     ordered = points[[place for cell, forward in chain for place in _run(cells[cell].tolist(), forward)[:-1]]]
     end = points[_run(cells[chain[-1][0]].tolist(), chain[-1][1])[-1]]
     ordered = np.concatenate([ordered, end[None]])
-    return Curve(points=_tuples(ordered), curved=cells.shape[1] == 3, **rest)
+    return Curve(points=_tuples(ordered), curved=cells.shape[1] == 3, repaired=remarks, **rest)
 
 
 def _tuples(points: Array) -> tuple[tuple[float, float], ...]:
@@ -411,7 +460,8 @@ def _directed(points: Array, curved: bool) -> Array:
         if _volume(points) < 0:
             points = points[::-1]
         ends = points[:-1:step]
-        top = int(np.lexsort((-ends[:, 0], -ends[:, 1]))[0]) * step
+        highest = ends[:, 1] >= ends[:, 1].max() - ROUND_OFF * extent(*points.T)  # of a flat top the outer end, whatever round-off says
+        top = int(np.argmax(np.where(highest, ends[:, 0], -np.inf))) * step
         return np.concatenate([points[top:-1], points[: top + 1]])
     poles = points[[0, -1], 0] == 0
     (R0, Z0), (R1, Z1) = points[[0, -1]]
@@ -419,7 +469,7 @@ def _directed(points: Array, curved: bool) -> Array:
         backwards = _volume(points) < 0
     elif poles.any():
         backwards = bool(poles[1])
-    elif abs(R1 - R0) >= abs(Z1 - Z0):
+    elif abs(R1 - R0) >= (1 - ROUND_OFF) * abs(Z1 - Z0):  # so that a cone of 45 degrees is one whatever round-off says
         backwards = R1 < R0
     else:
         backwards = Z1 > Z0
@@ -427,6 +477,10 @@ def _directed(points: Array, curved: bool) -> Array:
 
 
 def _volume(points: Array) -> float:
-    """Enclosed volume over pi of the polygon through the points, positive if it lies on the right of the curve."""
+    """Enclosed volume over pi of the polygon through the points, positive if it lies on the right of the curve.
+
+    The square of the largest radius is taken off where the curve is closed: it adds nothing but round-off.
+    """
     R, Z = points.T
-    return float(-np.sum((R[1:] ** 2 + R[1:] * R[:-1] + R[:-1] ** 2) / 3 * np.diff(Z)))
+    square = (R[1:] ** 2 + R[1:] * R[:-1] + R[:-1] ** 2) / 3
+    return float(-np.sum((square - (R.max() ** 2 if (points[0] == points[-1]).all() else 0.0)) * np.diff(Z)))

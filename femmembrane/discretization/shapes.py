@@ -1,7 +1,8 @@
 """Reference meridians beyond the disc: annulus, spherical cap, sphere, tube, torus.
 
 The parameter s is the arc length of the reference meridian over R0, from its first end to its last (of an annulus: the radius). A meridian
-runs so that the pressure pushes to its left: outwards where it closes a space, up where it is flat::
+of them runs so that the pressure pushes to its left: outwards where it closes a space, up where it is flat. A cap that hangs below its rim
+is the exception, it runs from its apex like any other (:func:`.meridian.side`)::
 
     annulus  z |        hub              cap  z |  .--.          sphere   .-s=0.       cylinder   |    s = 0      torus       s = 0
                |======o--------o rim            |      '.        z |    .'      '.      z |       |                 z |      .--.
@@ -131,7 +132,7 @@ class Cap(_Graded):
     Parameters
     ----------
     height : float
-        Of the apex over the plane of the rim, in R0; negative: the cap hangs below it, inverted; 0: flat.
+        Of the apex over the plane of the rim, in R0; negative: the cap hangs below it as a bowl, whose inside is above; 0: flat.
     elements, ratio : int, float
         Number of elements, and the size of that at the rim over that of that at the apex.
     rim : str

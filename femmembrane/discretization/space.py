@@ -22,7 +22,7 @@ from skfem.quadrature import get_quadrature
 
 from ..errors import InputError
 from ..physics.magnetics import acting_sources
-from .meridian import Array, Meridian
+from .meridian import LEAST_LENGTH, Array, Meridian, extent, side
 from .supports import as_support, floats, free_rotations
 
 #: pairs (i, j) of the local variables (u, u_x, w, w_x) in the order of Hessian entries
@@ -54,6 +54,10 @@ class Space:
     ----------
     closed : bool
         Whether the last node is the first one.
+    size : float
+        Largest radius of the meridian, or its height if that is larger.
+    side : {1, -1}
+        Whether the inside of the membrane is on the right of the meridian or on its left (:func:`.meridian.side`).
     lids : bool
         Whether flat lids across the ends close the volume; else every end is a pole or in the plane Z = 0, which closes it.
     wall : (ndarray, ndarray) or None
@@ -98,7 +102,7 @@ class Space:
     """
 
     def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
-        self.mesh, self.degree, self.anchored = mesh, degree, anchored
+        self.mesh, self.degree, self.anchored, self.side = mesh, degree, anchored, side(mesh)
         self.ends: Array = mesh.breakpoints()
         self.sizes: Array = np.diff(self.ends)
         line = skfem.MeshLine(self.ends)
@@ -125,14 +129,16 @@ class Space:
         self.supports = tuple(as_support(held) for held in self.mesh.supports())
         self.closed = not self.supports
         R, Z = self.mesh.position(self.ends[[0, -1]])
-        self.on_axis = on_axis = np.abs(R) < 1e-12
+        size = self.size = extent(*self.mesh.position(self.ends))
+        self.on_axis = on_axis = np.abs(R) <= LEAST_LENGTH * size
         self.axis_nodes = [] if self.closed else [k * (n_nodes - 1) for k in (0, 1) if on_axis[k] or self.supports[k].rigid]
         self.hubs = [-k for k, support in enumerate(self.supports) if support.rigid]
         self.edges = [-k for k, _ in enumerate(self.supports) if not on_axis[k]]
         self.nodes: NDArray[np.int64] = _folded(n_nodes) if self.closed else np.arange(n_nodes)
         self.n_nodes = n_nodes - int(self.closed)
         adrift = floats(self.supports)
-        in_plane = [pole or ("w" in end.held and height == 0) for pole, end, height in zip(on_axis, self.supports, Z, strict=False)]
+        level = np.abs(Z) <= LEAST_LENGTH * size
+        in_plane = [pole or ("w" in end.held and at_zero) for pole, end, at_zero in zip(on_axis, self.supports, level, strict=False)]
         self.loose = adrift and "along" in self.anchored
         self.lids = adrift or not all(in_plane)
         shift, tilt = free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
@@ -278,7 +284,7 @@ class Space:
     def reference_volume(self) -> float:
         """Volume that the membrane encloses at rest, over R0^3."""
         density = -(self.R**2) * self.Z_x / 2 if self.lids else self.R * self.R_x * self.Z
-        return float((self.weights * density).sum()) + 0.0
+        return self.side * float((self.weights * density).sum()) + 0.0
 
     def extend(self, x: Array) -> Array:
         """Free coefficients with the zero of the supports appended, so that ``extend(x)[numbers]`` covers all nodes."""
@@ -391,7 +397,9 @@ class Space:
 
     def interpolation_points(self) -> Array:
         """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""
-        return self.ends[:-1] + _lobatto(self.degree)[:, None] * self.sizes
+        points = self.ends[:-1] + _lobatto(self.degree)[:, None] * self.sizes
+        points[0], points[-1] = self.ends[:-1], self.ends[1:]  # neighbours share their end, and the last one is that of the meridian
+        return points
 
     def node_parameters(self) -> Array:
         """Parameters s of the nodes along the meridian: element ends and degree - 1 points between, shape (degree n_elements + 1,)."""

@@ -5,8 +5,8 @@ per reference area and a function g of the height per area projected onto the pl
 
     E = Int f(rho, eta) R dS + Int g(eta) rho d rho,      both with the 2 pi
 
-so that g acts like the pressure -g'(eta), and a function of the heights of rigid hubs. A new load is a class here with one of these, and a
-line in the registry of scenes.
+where an area counts as positive as the volume over it does, so that g acts like the pressure -g'(eta), and a function of the heights of
+rigid hubs. A new load is a class here with one of these, and a line in the registry of scenes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from .checks import is_number
 def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:
     """Integrand of the enclosed volume over 2 pi: V = 2 pi Int rho rho_s eta ds, signed (paper eq. 17).
 
-    It is that between the membrane and the plane z = 0, where every end is a pole or stays in that plane.
+    It is that between the membrane and the plane z = 0, where every end is a pole or stays in that plane; with the other sign where the
+    inside is on the left of the meridian (:func:`~femmembrane.discretization.meridian.side`).
     """
     return rho * rho_s * eta
 
@@ -77,9 +78,10 @@ class Load:
 
 @dataclass(frozen=True)
 class Hydrostatic(Load):
-    """A liquid that fills the membrane up to the plane of the rim and beyond.
+    """A liquid inside the membrane: under a disc or a dome, in a bowl, always with its weight downwards.
 
-    P is the pressure at the height of the rim, and P - gamma eta that at the height eta: E = gamma Int eta dV.
+    P is the pressure at the height of the rim, and P - gamma eta that at the height eta: E = gamma Int eta dV. Inside is what the reference
+    shape encloses, and below where it is flat (:mod:`~femmembrane.discretization.meridian`).
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status, unknown_name
 from ..threads import one_thread
 
@@ -427,10 +428,11 @@ class Branch(Sequence[Equilibrium]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was done about motions of the membrane as a whole that nothing resists; nothing for one that is held."""
+        """What was repaired of the points of the mesh, and what was done about motions of the membrane as a whole that nothing resists."""
         from ..discretization.space import space_of_scene
 
-        return () if self.scene.open else space_of_scene(self.scene).notes
+        repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
+        return () if self.scene.open else repaired + space_of_scene(self.scene).notes
 
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""
@@ -483,6 +485,7 @@ class Branch(Sequence[Equilibrium]):
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:
     s = np.atleast_1d(np.asarray(r, dtype=float))
-    if not ((s >= ends[0]) & (s <= ends[-1])).all():
+    margin = LEAST_LENGTH * float(ends[-1])  # whoever computes an end meets it to round-off only
+    if not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
         raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
-    return s
+    return np.clip(s, ends[0], ends[-1])

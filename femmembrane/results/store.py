@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.meridian import side
 from ..errors import InputError, Status
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from .records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 
 FORMAT = 1
+#: attribute of files that count the volume that a membrane encloses as positive wherever it is; before, one with its inside above did not
+_INSIDE = ("inside", "where the membrane encloses a volume, below where it is flat")
 
 _STRESSES = {
     "mechanical_stress_1": "meridional mechanical stress",
@@ -188,9 +191,13 @@ def load(path: str | PathLike[str]) -> Branch:
     dataset = _read(path)
     try:
         scene = scene_from_text(dataset.attrs["scene"])
-        return _branch(dataset, scene)
+        branch = _branch(dataset, scene)
     except (KeyError, ValueError) as error:
         raise InputError("path", str(path), f"a complete file written by femmembrane is needed ({error})") from error
+    if not scene.open and _INSIDE[0] not in dataset.attrs and side(scene.mesh) < 0:
+        what = "it is of a version that counted V and P of a membrane whose inside is above it as negative; compute it again"
+        raise InputError("path", str(path), what)
+    return branch
 
 
 def scene_text(scene: Scene) -> str:
@@ -354,6 +361,7 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "title": branch.scene.title or "Equilibria of an inflated membrane",
         "femmembrane_version": package_version(),
         "format": FORMAT,
+        _INSIDE[0]: _INSIDE[1],
         "status": branch.status.value,
         "message": branch.message,
         **({"solver": branch.solver} if branch.solver else {}),

@@ -302,10 +302,9 @@ def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
     """
     free = np.ones((space.n_nodes, 3), dtype=bool)
     opposite = []
-    radius = space.mesh.position(space.mesh.breakpoints()[[0, -1]])[0]
-    for node, support, R in zip(space.nodes[[0, -1]].tolist(), space.supports, radius, strict=False):
+    for node, support, on_axis in zip(space.nodes[[0, -1]].tolist(), space.supports, space.on_axis.tolist(), strict=False):
         in_plane, vertical = "u" not in support.held, "w" not in support.held
-        if abs(R) < 1e-12:
+        if on_axis:
             rigid = kind == 1 and vertical  # a pole that is held vertically is a fixed point
             free[node] = [rigid, False, kind == 0 and vertical]
             opposite += [node] if rigid else []
@@ -357,7 +356,7 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     for end in space.free_ends if n else ():
         rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
         i, j = layout.numbers[space.nodes[end], [_A // 2, _B // 2]]
-        work = np.pi * n * pressure * float(rho[0]) * (1 if end == 0 else -1)  # of the film across a free edge
+        work = np.pi * n * pressure * float(rho[0]) * (space.side if end == 0 else -space.side)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
     rigid, spin = None, None
@@ -438,7 +437,8 @@ def _density(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: fl
     J = np.hypot(space.R_x, space.Z_x)
     area = space.weights * space.R * J
     xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
-    g, g_z, g_zz = (part * space.weights for part in over_projection(loads, r.eta))
+    inside = space.weights * space.side
+    g, g_z, g_zz = (part * inside for part in over_projection(loads, r.eta))
     t, z = r.t_rho, r.t_z
     A, B, N1, N2 = r.A, r.B, r.N1, r.N2
     along, out, across = A * t**2 + N2 * z**2, A * z**2 + N2 * t**2, (A - N2) * t * z  # of e, of f, mixed
@@ -462,7 +462,7 @@ def _density(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: fl
         (_B, _B): n**2 * out * oo + m_zz * area + g_zz * r.rho * r.rho_x,
         (_BX, _BX): (r.W11 * z**2 + N1 * t**2) * xx,
     }
-    parts = [_volume_density(space, r, -pressure * space.weights, n)]
+    parts = [_volume_density(space, r, -pressure * inside, n)]
     if loads:
         parts.append(_projected_density(r, g, g_z, n))
     for pair, part in (item for added in parts for item in added.items()):

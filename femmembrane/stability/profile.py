@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.meridian import LEAST_LENGTH
 from ..discretization.space import space_of_scene
 from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
@@ -80,7 +81,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     u, own, w, _ = space.evaluate(x, s)
     u_s, w_s = space.recovered_slopes(x, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
-    pole = R == 0  # there u/R is the limit u_s/R_s
+    pole = np.abs(R) <= LEAST_LENGTH * space.size  # there u/R is the limit u_s/R_s
     u_s = np.where(
         pole & (u_s / np.where(pole, R_s, 1.0) <= -1), own, u_s
     )  # a recovered slope overshoots where a few elements hold a drawn-out pole

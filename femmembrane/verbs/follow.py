@@ -176,7 +176,8 @@ def run(
         observers: dict[str, Any] = {"on_step": on_step, "on_checkpoint": on_checkpoint}
         if unfinished is not None:
             return resume_trace(scene, unfinished, until=asked.until, max_steps=asked.max_steps, **observers)
-        return trace(scene, start=cast(float, asked.start), until=asked.until, max_steps=asked.max_steps, throw=False, **observers)
+        ways: dict[str, Any] = {"until": asked.until, "direction": asked.direction, "max_steps": asked.max_steps}
+        return trace(scene, start=cast(float, asked.start), throw=False, **ways, **observers)
     return _follow(
         scene,
         asked.control,

@@ -120,7 +120,8 @@ def _traced(scene: Scene, options: Options, special_points: bool = True, ended: 
         raise InputError("run", None, "missing")
     piece = asked.max_steps if ended is None else _PIECE
     ways: dict[str, Any] = {"until": asked.until, "special_points": special_points}
-    branch = trace(scene, start=cast(float, asked.start), direction=options.direction, max_steps=min(piece, asked.max_steps), **ways)
+    direction = asked.direction if options.direction == 1 else options.direction
+    branch = trace(scene, start=cast(float, asked.start), direction=direction, max_steps=min(piece, asked.max_steps), **ways)
     while ended is not None and branch.status is Status.STEP_LIMIT and not ended(branch):
         made = len(branch) - 1
         if made >= asked.max_steps:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..discretization.meridian import side
 from ..errors import InputError
 from ..results.grid import dataset_of, load_dataset, save_dataset
 from ..results.kept import Kept
@@ -317,7 +318,9 @@ def _key(scene: Scene, quantity: str, options: Options) -> str:
     from .. import __version__
 
     tables = {name: table for name, table in scene.to_dict().items() if name != "title"}
-    text = json.dumps([_canonical(tables), quantity, _canonical(asdict(options)), __version__], sort_keys=True)
+    # rows of membranes with their inside above were kept with other signs before
+    signs = ["inside above"] if side(scene.mesh) < 0 else []
+    text = json.dumps([_canonical(tables), quantity, _canonical(asdict(options)), __version__, *signs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

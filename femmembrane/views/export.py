@@ -4,13 +4,15 @@
 suffix   what is in the file                                                 read by
 =======  ==================================================================  ==========================
 .pvd     all equilibria: a collection of VTU files in a folder beside it     ParaView
-.xdmf    all equilibria, the numbers in an HDF5 file beside it               ParaView, VisIt
+.xdmf    all equilibria, the numbers in an HDF5 file beside it               ParaView, VisIt, meshio
 .vtu     one equilibrium with stretches and stresses                         ParaView, PyVista, meshio
 .stl     one equilibrium as triangles, nothing but its shape                 CAD, printing
 .obj     one equilibrium as triangles and quadrilaterals                     Blender and its like
 .csv     the deformed meridians with stretches and stresses, of all          anything
          equilibria or of one
 =======  ==================================================================  ==========================
+
+Lengths are in units of R0, or in m where the scene has scales (in .csv then both); normals point the way the pressure pushes.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ import numpy as np
 from ..errors import InputError, unknown_name
 from ..results.store import replace_file
 from .stage import place_of
-from .vtk import FIELDS, Array, Revolution, smooth_profile, surface_data, write_surface, write_vtk
+from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
@@ -87,11 +89,17 @@ def _write_csv(shown: Sequence[tuple[int, Equilibrium]], path: Path) -> list[Pat
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     names = [name for name in ("r", "rho", "eta", *FIELDS) if name in shown[0][1].profile()]
-    writer.writerow(["step", "volume", "pressure", *names])
+    scales = shown[0][1].scene.scales
+    in_m = [] if scales is None else [name for name in ("r", "rho", "eta") if name in names]
+    writer.writerow(["step", "volume", "pressure", *names, *(f"{name}_m" for name in in_m)])
     for number, equilibrium in shown:
-        profile = equilibrium.profile()
+        profile = dict(equilibrium.profile())
+        if scales is not None:
+            profile |= {f"{name}_m": scales.to_si("length", profile[name]) for name in in_m}
         loads = [number, equilibrium.volume, equilibrium.pressure]
-        writer.writerows([*loads, *row] for row in zip(*(profile[name].tolist() for name in names), strict=True))
+        writer.writerows(
+            [*loads, *row] for row in zip(*(profile[name].tolist() for name in [*names, *(f"{name}_m" for name in in_m)]), strict=True)
+        )
     with replace_file(path) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")
     return [path]
@@ -123,8 +131,8 @@ def _write_obj(equilibrium: Equilibrium, path: Path) -> None:
 
 def _surface(equilibrium: Equilibrium) -> tuple[Array, Revolution]:
     profile = smooth_profile(equilibrium)
-    revolution = Revolution.of(profile["r"], closed=equilibrium.potential.space.closed)
-    return revolution.vectors(profile["rho"], profile["eta"]), revolution
+    revolution = Revolution.of_membrane(equilibrium, profile["r"])
+    return shown_length(equilibrium) * revolution.vectors(profile["rho"], profile["eta"]), revolution
 
 
 def _write_pvd(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
@@ -137,7 +145,7 @@ def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
 
     numbers, grids = path.with_suffix(".h5"), []
     with replace_file(numbers) as temporary, h5py.File(temporary, "w") as file:
-        revolution = Revolution.of(smooth_profile(branch[0])["r"], closed=branch[0].potential.space.closed)
+        revolution = Revolution.of_membrane(branch[0], smooth_profile(branch[0])["r"])
         mixed = [
             np.insert(cells, 0, code, axis=1).ravel() for code, cells in ((_TRIANGLE, revolution.triangles), (_QUAD, revolution.quads))
         ]
@@ -146,24 +154,29 @@ def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
         topology = f'<Topology TopologyType="Mixed" NumberOfElements="{count}">{_item(numbers, file, "cells")}</Topology>'
         for step, equilibrium in enumerate(branch):
             profile = smooth_profile(equilibrium)
-            data = {"points": revolution.vectors(profile["rho"], profile["eta"]), **surface_data(equilibrium, profile, revolution)}
+            points = shown_length(equilibrium) * revolution.vectors(profile["rho"], profile["eta"])
+            data = {"points": points, **surface_data(equilibrium, profile, revolution)}
             for name, values in data.items():
                 file.create_dataset(f"{step}/{name}", data=values, compression="gzip", compression_opts=1, shuffle=True)
-            grids.append(_grid(numbers, file, step, topology, data))
-    head = '<?xml version="1.0"?>\n<Xdmf Version="2.0"><Domain><Grid Name="steps" GridType="Collection" CollectionType="Temporal">\n'
+            grids.append(_grid(numbers, file, f"{step}", topology, data, in_time=len(branch) > 1))
+    head, foot = '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n', "\n</Domain></Xdmf>\n"
+    text = grids[0]
+    if len(grids) > 1:  # meshio reads one grid as a mesh, several as its TimeSeriesReader
+        text = '<Grid Name="steps" GridType="Collection" CollectionType="Temporal">\n' + "\n".join(grids) + "\n</Grid>"
     with replace_file(path) as temporary:
-        temporary.write_text(head + "\n".join(grids) + "\n</Grid></Domain></Xdmf>\n", encoding="utf-8")
+        temporary.write_text(head + text + foot, encoding="utf-8")
     return [numbers, path]
 
 
-def _grid(numbers: Path, file: Mapping[str, Array], step: int, topology: str, data: Mapping[str, Array]) -> str:
+def _grid(numbers: Path, file: Mapping[str, Array], step: str, topology: str, data: Mapping[str, Array], in_time: bool) -> str:
     parts = [topology, f'<Geometry GeometryType="XYZ">{_item(numbers, file, f"{step}/points")}</Geometry>']
     for name, values in data.items():
         if name != "points":
             kind = "Vector" if values.ndim > 1 else "Scalar"
             item = _item(numbers, file, f"{step}/{name}")
             parts.append(f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="Node">{item}</Attribute>')
-    return f'<Grid Name="step {step}"><Time Value="{step}"/>\n' + "\n".join(parts) + "\n</Grid>"
+    time = f'<Time Value="{step}"/>\n' if in_time else ""
+    return f'<Grid Name="step {step}" GridType="Uniform">{time}' + "\n".join(parts) + "\n</Grid>"
 
 
 def _item(numbers: Path, file: Mapping[str, Array], name: str) -> str:

@@ -22,7 +22,7 @@ from ..results.store import replace_file
 from ..stability.verdict import Verdict
 from .picture import aim, circles, new_plotter, polydata
 from .stage import Box
-from .vtk import SECTORS, Array, Revolution, smooth_profile, write_collection
+from .vtk import SECTORS, Array, Revolution, shown_length, smooth_profile, write_collection
 
 if TYPE_CHECKING:
     import pyvista
@@ -48,7 +48,8 @@ def write_mode_vtk(
     """Write one period of a mode as one VTU file a frame and the PVD file that strings them together for ParaView.
 
     The VTU files go to a folder beside ``path``, named like it. Frame k has the phase 2 pi k/frames, so that the first shows the mode at
-    full amplitude, and after the last the motion repeats. The point data ``displacement`` is that from the equilibrium.
+    full amplitude, and after the last the motion repeats. The point data ``displacement`` is that from the equilibrium. Lengths are in m
+    where the scene has scales.
 
     Parameters
     ----------
@@ -76,7 +77,8 @@ def write_mode_vtk(
     if isinstance(frames, bool) or not isinstance(frames, (int, np.integer)) or frames < 2:
         raise InputError("frames", frames, "a whole number >= 2 is allowed")
     surface = ModeSurface(equilibrium, mode, amplitude)
-    return write_collection(path, frames, lambda frame, file: _write_frame(surface, float(np.cos(2 * np.pi * frame / frames)), file))
+    length = shown_length(equilibrium)
+    return write_collection(path, frames, lambda k, file: _write_frame(surface, float(np.cos(2 * np.pi * k / frames)), length, file))
 
 
 def render_mode(
@@ -124,7 +126,7 @@ class ModeSurface:
         profile = smooth_profile(equilibrium)
         self.rho, self.eta = profile["rho"], profile["eta"]
         self.extent = Box.of([profile]).size
-        self.revolution = Revolution.of(profile["r"], max(sectors, _PER_WAVE * self.n), equilibrium.potential.space.closed)
+        self.revolution = Revolution.of_membrane(equilibrium, profile["r"], max(sectors, _PER_WAVE * self.n))
         self.rest = self.revolution.vectors(self.rho, self.eta)
         unit = _displacements(self.revolution, shape, self.n)
         if amplitude is None:
@@ -166,13 +168,13 @@ def _displacements(revolution: Revolution, shape: Mapping[str, Array], n: int) -
     return np.stack([u * x - c * y, u * y + c * x, w], axis=1)
 
 
-def _write_frame(surface: ModeSurface, phase: float, file: Path) -> None:
+def _write_frame(surface: ModeSurface, phase: float, length: float, file: Path) -> None:
     import meshio
 
     revolution = surface.revolution
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads)) if len(c)]
     moved = phase * surface.displacement
-    mesh = meshio.Mesh(surface.rest + moved, cells, point_data={"displacement": moved})
+    mesh = meshio.Mesh(length * (surface.rest + moved), cells, point_data={"displacement": length * moved})
     with replace_file(file) as temporary:
         mesh.write(temporary, file_format="vtu")
 

@@ -118,7 +118,7 @@ class Surface:
             quantity,
             profile["rho"],
             profile["eta"],
-            Revolution.of(profile["r"], sectors, equilibrium.potential.space.closed),
+            Revolution.of_membrane(equilibrium, profile["r"], sectors),
             values,
         )
 

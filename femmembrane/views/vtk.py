@@ -22,6 +22,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError
 from ..results.store import replace_file
 
@@ -68,9 +69,12 @@ class Revolution:
     line: NDArray[np.int32]
 
     @classmethod
-    def of(cls, r: Array, sectors: int = SECTORS, closed: bool = False) -> Revolution:
-        """Revolve nodes at the reference radii r; a node with r = 0 lies on the axis, and the last one of a closed curve is the first."""
-        copies = np.where(r > 0, sectors, 1)
+    def of(cls, r: Array, sectors: int = SECTORS, closed: bool = False, side: int = 1) -> Revolution:
+        """Revolve nodes at the reference radii r; a node with r = 0 lies on the axis, and the last one of a closed curve is the first.
+
+        With ``side`` = -1 the inside is on the left of the meridian (:func:`~femmembrane.discretization.meridian.side`).
+        """
+        copies = np.where(r > LEAST_LENGTH * np.max(r), sectors, 1)
         if closed:
             copies[-1] = 0
         first = np.cumsum(copies) - copies
@@ -82,14 +86,24 @@ class Revolution:
         cells = np.stack([a, b, np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)], axis=2).reshape(-1, 4).astype(np.int32)
         inner, outer = cells[:, 0] == cells[:, 3], cells[:, 1] == cells[:, 2]
         angle = 2 * np.pi * np.concatenate([turn[:n] for n in copies]) / sectors
+        triangles = np.concatenate([cells[inner & ~outer][:, :3], cells[outer & ~inner][:, [0, 1, 3]]])
+        quads = cells[~inner & ~outer]
+        if side < 0:
+            triangles, quads = triangles[:, ::-1], quads[:, ::-1]
         return cls(
             node=np.repeat(np.arange(r.size), copies),
             cosine=np.cos(angle),
             sine=np.sin(angle),
-            triangles=np.concatenate([cells[inner & ~outer][:, :3], cells[outer & ~inner][:, [0, 1, 3]]]),
-            quads=cells[~inner & ~outer],
+            triangles=triangles,
+            quads=quads,
             line=np.stack([point[:-1, 0], point[1:, 0]], axis=1).astype(np.int32),
         )
+
+    @classmethod
+    def of_membrane(cls, equilibrium: Equilibrium, r: Array, sectors: int = SECTORS) -> Revolution:
+        """Revolve nodes of a membrane, so that the normals point the way the pressure pushes."""
+        space = equilibrium.potential.space
+        return cls.of(r, sectors, space.closed, space.side)
 
     def vectors(self, radial: Array, vertical: Array) -> Array:
         """Vectors (or positions) at the points from their components at the nodes, shape (n_points, 3)."""
@@ -168,15 +182,23 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
     return profile
 
 
+def shown_length(equilibrium: Equilibrium) -> float:
+    """Length in a file of the unit of length R0: 1, or what it is in m where the scene has scales."""
+    scales = equilibrium.scene.scales
+    return 1.0 if scales is None else scales.to_si("length", 1.0)
+
+
 def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: Path) -> None:
     """Write the surface of one equilibrium as a VTU file."""
     import meshio
 
-    revolution = Revolution.of(profile["r"], closed=equilibrium.potential.space.closed)
+    revolution = Revolution.of_membrane(equilibrium, profile["r"])
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
+    if (scales := equilibrium.scene.scales) is not None:
+        loads |= {"pressure_pa": scales.to_si("pressure", loads["pressure"]), "volume_m3": scales.to_si("volume", loads["volume"])}
     mesh = meshio.Mesh(
-        revolution.vectors(profile["rho"], profile["eta"]),
+        shown_length(equilibrium) * revolution.vectors(profile["rho"], profile["eta"]),
         cells,
         point_data=surface_data(equilibrium, profile, revolution),
         cell_data={name: [np.full(len(c), load) for _, c in cells] for name, load in loads.items()},
@@ -189,7 +211,8 @@ def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolut
     """What is known at the points of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
     parameters = equilibrium.potential.space.node_parameters()
     R, Z = equilibrium.scene.mesh.position(parameters)
-    data: dict[str, NDArray[Any]] = {"displacement": revolution.vectors(profile["rho"] - R, profile["eta"] - Z)}
+    moved = revolution.vectors(profile["rho"] - R, profile["eta"] - Z)
+    data: dict[str, NDArray[Any]] = {"displacement": shown_length(equilibrium) * moved}
     data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
     if equilibrium.scene.analysis.wrinkling:
         data["zone"] = revolution.scalars(equilibrium.zones().numbers(parameters).astype(np.int32))

@@ -1,0 +1,120 @@
+"""Lines in input files of Abaqus (.inp): *NODE, *ELEMENT of line elements, *NSET is left out, *ELSET names groups."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import MOST_NUMBERS, Lines, UnreadableError, numbers, whole
+
+#: beginnings of the names of elements on a line, with two points and with three
+_TWO = ("B21", "B31", "B23", "B33", "T2D2", "T3D2", "SAX1", "MAX1", "MGAX1", "R2D2", "RAX2", "RB2D2", "RB3D2", "CONN2D2", "CONN3D2", "S1")
+_THREE = ("B22", "B32", "T2D3", "T3D3", "SAX2", "MAX2", "MGAX2")
+
+
+#: numbers of elements from, to, by steps of
+_Range = tuple[int, int, int]
+
+
+def read(path: Path) -> Lines:
+    """The lines of a .inp file."""
+    nodes: list[list[str]] = []
+    blocks: list[tuple[str, str, list[list[str]]]] = []
+    sets: list[tuple[str, bool, list[list[str]]]] = []
+    body: list[list[str]] = []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        words = [word.strip() for word in line.split(",")]
+        if line.startswith("**") or not line.strip():
+            continue
+        if not line.startswith("*"):
+            body.append([word for word in words if word])
+            continue
+        name, options = words[0].upper(), {key.strip().upper(): value.strip() for key, _, value in (w.partition("=") for w in words[1:])}
+        if name == "*INCLUDE":
+            raise UnreadableError("it includes another file; one file is read, which holds all")
+        body = nodes if name == "*NODE" else []
+        if name == "*ELEMENT":
+            blocks.append((options.get("TYPE", "").upper(), options.get("ELSET", ""), body))
+        elif name == "*ELSET":
+            sets.append((options.get("ELSET", ""), "GENERATE" in options, body))
+    if not nodes:
+        raise UnreadableError("its nodes (*NODE) are missing")
+    rows = numbers([(row + ["0"] * 4)[:4] for row in nodes], "nodes")
+    lines = Lines(rows[:, 1:])
+    tables, members = _elements(lines, blocks)
+    for name, generate, body in sets:
+        _add_members(members.setdefault(name, []), members, generate, body)
+    tags = whole(rows[:, 0], "numbers of nodes")
+    for size, parts in tables.items():
+        if parts:
+            _add(lines, tags, np.concatenate(parts), members, size)
+    return lines
+
+
+def _elements(
+    lines: Lines, blocks: list[tuple[str, str, list[list[str]]]]
+) -> tuple[dict[int, list[NDArray[np.int64]]], dict[str, list[_Range]]]:
+    """Tables of lines by their size, each row an element and its nodes, and which elements the sets named with them have."""
+    tables: dict[int, list[NDArray[np.int64]]] = {2: [], 3: []}
+    members: dict[str, list[_Range]] = {}
+    for kind, name, body in blocks:
+        size = 2 if kind.startswith(_TWO) else 3 if kind.startswith(_THREE) else 0
+        if size and body:
+            tables[size].append(whole(numbers([row[: 1 + size] for row in body], "elements"), "elements").reshape(-1, 1 + size))
+            if name:
+                members.setdefault(name, []).extend((n, n, 1) for n in tables[size][-1][:, 0].tolist())
+        elif body:
+            lines.others.add(kind[:40] or "elements without a type")
+    return tables, members
+
+
+def _add_members(own: list[_Range], members: dict[str, list[_Range]], generate: bool, body: list[list[str]]) -> None:
+    for row in body:
+        if generate:
+            first, last, step = (int(word) for word in [*row, "1"][:3])
+            own.append((first, last, max(step, 1)))
+        else:
+            for word in row:
+                own.extend([(int(word), int(word), 1)] if word.isdigit() else members.get(word, []))
+        if len(own) > MOST_NUMBERS:
+            raise UnreadableError(f"a set has more than {MOST_NUMBERS} members")
+
+
+def _add(lines: Lines, tags: NDArray[np.int64], table: NDArray[np.int64], members: dict[str, list[_Range]], size: int) -> None:
+    """Add elements of one size, those of the same sets together."""
+    order = np.argsort(tags, kind="stable")
+    place = np.minimum(np.searchsorted(tags[order], table[:, 1:]), len(tags) - 1)
+    nodes = order[place]
+    if (tags[nodes] != table[:, 1:]).any():
+        raise UnreadableError("an element has a node that is not in the file")
+    if size == 3:
+        nodes = _inner_last(lines.points, nodes)
+    elements = table[:, 0]
+    of_element: list[list[str]] = [[] for _ in elements]
+    for name, ranges in members.items():
+        single = np.array([first for first, last, _ in ranges if first == last], dtype=np.int64)
+        belongs = np.isin(elements, single)
+        for first, last, step in ranges:
+            if first != last:
+                belongs |= (elements >= first) & (elements <= last) & ((elements - first) % step == 0)
+        for k in np.flatnonzero(belongs).tolist():
+            of_element[k].append(name)
+    rows: dict[frozenset[str], list[int]] = {}
+    for k, names in enumerate(of_element):
+        rows.setdefault(frozenset(names), []).append(k)
+    for groups, chosen in rows.items():
+        lines.add(nodes[chosen], groups)
+
+
+def _inner_last(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Cells with the point inside last: programs write it second or third, so it is the one that sees the others in opposite directions."""
+    corners = points[nodes]
+    seen = [((corners[:, (k + 1) % 3] - corners[:, k]) * (corners[:, (k + 2) % 3] - corners[:, k])).sum(axis=1) for k in range(3)]
+    inner = np.argmin(seen, axis=0)
+    rows = np.arange(len(nodes))
+    inside = nodes[rows, inner]
+    nodes = nodes.copy()
+    nodes[rows, inner], nodes[rows, 2] = nodes[:, 2], inside
+    return nodes

@@ -330,7 +330,7 @@ def _bounds(parameter: Parameter, bounds: tuple[float, float], direction: int) -
         raise InputError("direction", direction, "1 (towards larger values) or -1 is allowed")
     try:
         low, high = (float(b) for b in bounds)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("bounds", bounds, "two finite numbers, smallest and largest, are allowed") from None
     if not (np.isfinite([low, high]).all() and low < high):
         raise InputError("bounds", bounds, "two finite numbers, smallest and largest, are allowed")

@@ -13,6 +13,7 @@ import functools
 import os
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any, Generic, ParamSpec, Self, TypeVar, overload
 
 from threadpoolctl import ThreadpoolController
@@ -125,58 +126,18 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-class _Limit:
-    """The limit of one BLAS thread, from the first computation that needs it to the end of the last one, whichever threads they are in."""
-
-    def __init__(self) -> None:
-        self._guard = Guard()
-        self._own = threading.local()
-        self._count = 0
-        self._limiter: Any = None
-
-    def __enter__(self) -> None:
-        with self._guard:
-            if not self._count:
-                self._limiter = _controller().limit(limits=1, user_api="blas")
-            self._count += 1
-        self._own.depth = getattr(self._own, "depth", 0) + 1
-
-    def __exit__(self, *error: object) -> None:
-        self._own.depth -= 1
-        with self._guard:
-            self._count -= 1
-            if not self._count:
-                self._lift()
-
-    def only_own(self) -> None:
-        """In a process that was just forked, where the computations of other threads are not."""
-        self._count = getattr(self._own, "depth", 0)
-        if not self._count and self._limiter is not None:
-            self._lift()
-
-    def _lift(self) -> None:
-        self._limiter.restore_original_limits()
-        self._limiter = None
-
-
-_limit = _Limit()
-
-
 def one_thread(function: Callable[P, T]) -> Callable[P, T]:
     """Run a function with BLAS limited to one thread; the caller's setting is restored afterwards."""
 
     @functools.wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> T:
-        with _limit:
+        with ExitStack() as stack:
+            with WHOLE:
+                stack.enter_context(_controller().limit(limits=1, user_api="blas"))
             return function(*args, **kwargs)
 
     return limited
 
 
-def _forked() -> None:
-    WHOLE.anew()
-    _limit.only_own()
-
-
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=WHOLE.close, after_in_parent=WHOLE.open, after_in_child=_forked)
+    os.register_at_fork(before=WHOLE.close, after_in_parent=WHOLE.open, after_in_child=WHOLE.anew)

@@ -316,7 +316,7 @@ REFUSED = [
     (plain(analysis={"stability": ["presure"]}), "analysis.stability[0]", "did you mean 'pressure'"),
     (plain(analysis={"stability": "pressure"}), "analysis.stability", "a list"),
     (plain(analysis={"stability": ["volume", "volume"]}), "analysis.stability", "once"),
-    (plain(analysis={"azimuthal_modes": [0]}), "analysis.azimuthal_modes[0]", ">= 1"),
+    (plain(analysis={"azimuthal_modes": [0]}), "analysis.azimuthal_modes[0]", "from 1 to 1000000"),
     (plain(analysis={"azimuthal_modes": [1, 2.0]}), "analysis.azimuthal_modes[1]", "whole number"),
     (plain(analysis={"azimuthal_modes": [True]}), "analysis.azimuthal_modes[0]", "whole number"),
     (plain(analysis={"azimuthal_modes": 1}), "analysis.azimuthal_modes", "a list"),

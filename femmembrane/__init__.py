@@ -154,7 +154,10 @@ __all__ = ["__version__", *sorted(_HOME)]
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module("." + _HOME[name], __name__), name)
+    from .threads import WHOLE
+
+    with WHOLE:  # a process that is forked in the middle of an import could never make it
+        value = getattr(importlib.import_module("." + _HOME[name], __name__), name)
     globals()[name] = value
     return value
 

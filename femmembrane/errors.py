@@ -117,9 +117,17 @@ def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
     return InputError(key, name, hint + "known: " + ", ".join(known))
 
 
+#: items of a list that a message may show
+_SHOWN = 80
+
+
 def _shown(value: Any) -> str:
+    if isinstance(value, (list, tuple)) and len(value) > _SHOWN:
+        value = value[:_SHOWN]  # the rest is cut off anyway
     try:
         return repr(value)
+    except RecursionError:
+        return "tables or lists in each other, too many to show"
     except ValueError:  # Python does not print whole numbers of more than 4300 digits
         return "a number of thousands of digits"
 

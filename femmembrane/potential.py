@@ -17,8 +17,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from threading import Lock
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -32,6 +31,7 @@ from .physics.kinematics import hencky_strains
 from .physics.loads import Load, hub_density, lidded_volume_density, on_hubs, over_projection, over_reference, volume_density, wall_density
 from .physics.magnetics import Source, acting_sources, magnetic_energy_density, swept
 from .physics.tension_field import strain_energy
+from .threads import Guard, cached_property
 
 if TYPE_CHECKING:
     from ._native import Elements
@@ -42,6 +42,10 @@ Array = NDArray[np.float64]
 
 #: points evaluated in one go; larger vectors leave the processor's cache
 _BLOCK = 1024
+
+
+#: held while expressions are built: CasADi has one mode for all threads that says what a product of symbols is
+BUILDING = Guard()
 
 
 @dataclass(slots=True)
@@ -92,6 +96,7 @@ class Potential:
         Polynomial degree integrated exactly; default 2 degree + 1.
     """
 
+    @BUILDING
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
@@ -154,6 +159,7 @@ class Potential:
         return space.assemble_vector(density.reshape(-1, space.n_elements))[:, None] / np.sqrt(self.area)
 
     @cached_property
+    @BUILDING
     def point_function(self) -> ca.Function:
         """(data, local variables, (P, factor on sources and loads)) -> values, gradients and the Hessian at one point."""
         t, (data, local, parameters) = self.terms, self.symbols
@@ -243,6 +249,7 @@ class Potential:
         return float(self._load_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
 
     @cached_property
+    @BUILDING
     def _load_kernel(self) -> _Kernel:
         return _Kernel(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
 
@@ -307,6 +314,7 @@ class Potential:
         return _at_points(self._response_function, e1, e2)
 
     @cached_property
+    @BUILDING
     def _response_function(self) -> ca.Function:
         e = ca.SX.sym("e", 2)
         with _casadi_answers_numpy():
@@ -326,6 +334,7 @@ class Potential:
         return _at_points(self._field_energy_function, rho, eta)
 
     @cached_property
+    @BUILDING
     def _field_energy_function(self) -> ca.Function:
         y = ca.SX.sym("y", 2)
         with _casadi_answers_numpy():
@@ -363,6 +372,7 @@ class Family(Potential):
         The parts of the member at a value of the number, a CasADi symbol here: an object with the attributes of a scene.
     """
 
+    @BUILDING
     def __init__(self, scene: Scene, vary: Callable[[Any], Any], quadrature: int | None = None) -> None:
         _require_elements(scene)
         number = ca.SX.sym("number")
@@ -375,6 +385,7 @@ class Family(Potential):
         self.terms = {name: ca.substitute(self.terms[name], old, new) for name in names}
 
     @cached_property
+    @BUILDING
     def _fold_kernel(self) -> _Kernel:
         t, (data, local, parameters) = self.terms, self.symbols
         mode, q = ca.SX.sym("mode", 4), ca.SX.sym("q")
@@ -452,6 +463,7 @@ class StrainEnergy:
 
 
 @lru_cache(maxsize=64)
+@BUILDING
 def _derivatives(function: Callable[[Any, Any], Any]) -> ca.Function:
     """(e_1, e_2) -> W, s_1, s_2, and the second derivatives with respect to the Hencky strains."""
     e = ca.SX.sym("e", 2)
@@ -464,6 +476,7 @@ def _derivatives(function: Callable[[Any, Any], Any]) -> ca.Function:
 class _Kernel:
     """A point function replayed on vectors of points, called through preallocated buffers."""
 
+    @BUILDING
     def __init__(self, function: ca.Function, data: Array) -> None:
         n = data.shape[1]
         self.block = min(n, _BLOCK)
@@ -476,7 +489,7 @@ class _Kernel:
         self._local = np.ones((self.n_blocks, function.numel_in(1), self.block))
         self._parameters = np.zeros(function.numel_in(2))
         self._out = np.zeros((self.n_blocks, self.rows, self.block))
-        self._lock = Lock()
+        self._lock = Guard()
         self._buffer, self._call = vector.buffer()
         for k, array in enumerate((self._data, self._local, self._parameters)):
             self._buffer.set_arg(k, memoryview(array))  # type: ignore[arg-type, call-arg]
@@ -683,6 +696,7 @@ def _at_points(function: ca.Function, *columns: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
+@BUILDING
 def _kernel_at(function: ca.Function, n: int) -> _Kernel:
     """A function of the local variables alone as a kernel at n points."""
     symbols = [ca.SX.sym("data", 0), function.sx_in(0), ca.SX.sym("parameters", 0)]
@@ -691,7 +705,7 @@ def _kernel_at(function: ca.Function, n: int) -> _Kernel:
 
 @contextmanager
 def _casadi_answers_numpy() -> Iterator[None]:
-    """Let NumPy's ufuncs act on CasADi symbols here without changing the caller's setting."""
+    """Let NumPy's ufuncs act on CasADi symbols here without changing the caller's setting; to be used under :data:`BUILDING`."""
     before = ca.GlobalOptions.getNumpyMode()
     ca.GlobalOptions.setNumpyMode(1)
     try:

@@ -21,12 +21,13 @@ Values are checked where the objects are made, so that files and Python code mee
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import re
 import tomllib
+import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -39,6 +40,8 @@ from .discretization.mesh_files import Curve, read_meridian
 from .discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from .discretization.supports import as_support, floats
 from .errors import InputError, unknown_name
+from .memory import SMALL, require
+from .physics.checks import number
 from .physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
 from .physics.loads import HubForce, Hydrostatic, Load, Weight, on_hubs
 from .physics.magnetics import Dipole, Source, distance_to_polyline
@@ -95,8 +98,19 @@ _OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, 
 MAX_DEGREE = 8
 #: size of a scene file: a million elements by their radii; what goes on for ever is none
 MAX_BYTES = 2**25
+#: waves around the axis; a thousand times finer than a mesh resolves
+MAX_WAVES = 10**6
+#: characters of a title
+MAX_TEXT = 1000
 #: equilibria of a run, which has to keep them all
 MAX_STEPS = 10**6
+#: bytes that a computation takes for each element and degree at least, measured on 20000 elements: by Newton's method, and by IPOPT
+_BYTES, _BYTES_MINIMISED = 5000, 14000
+#: bytes that every equilibrium takes beside its state and profiles, and how many numbers these have at a node
+_BYTES_STEP, _PROFILES = 2000, 10
+#: sources, loads, verdicts, wave numbers
+_MAX_ITEMS = 10**4
+_FINITE = "a finite number is allowed"
 _DEGREE = 2
 _RADIUS_TO_THICKNESS = 1000.0
 _MAX_STEPS = 400
@@ -176,8 +190,8 @@ class Run:
         _choice("run.at_limit", self.at_limit, AT_LIMIT)
         _convert(
             self,
-            start=_optional(_number, "run.start", self.start),
-            stop=_optional(_number, "run.stop", self.stop),
+            start=_optional(_finite, "run.start", self.start),
+            stop=_optional(_finite, "run.stop", self.stop),
             steps=None if self.steps is None else _whole("run.steps", self.steps, most=MAX_STEPS),
             values=_optional(_loads, "run.values", self.values),
             until=_optional(_target, "run.until", self.until),
@@ -249,7 +263,7 @@ class Analysis:
         modes = _sequence("analysis.azimuthal_modes", self.azimuthal_modes, "a list of whole numbers >= 1 is allowed")
         for k, name in enumerate(stability):
             _choice(f"analysis.stability[{k}]", name, VERDICTS)
-        modes = tuple(_whole(f"analysis.azimuthal_modes[{k}]", n) for k, n in enumerate(modes))
+        modes = tuple(_whole(f"analysis.azimuthal_modes[{k}]", n, most=MAX_WAVES) for k, n in enumerate(modes))
         _unique("analysis.stability", stability)
         _unique("analysis.azimuthal_modes", modes)
         if self.wrinkling is not None:
@@ -333,8 +347,24 @@ class Scene:
             tension_field=_switch("effects.tension_field", self.tension_field),
             title=_text("title", self.title),
         )
+        self._check_size()
         self._check_sources()
         self._check_hubs()
+
+    def _check_size(self) -> None:
+        """Refuse what there is no room for, before any of it is built."""
+        if self.open:
+            return
+        count, degree = self.mesh.elements, self.degree
+        run = self.run
+        minimised = run is not None and run.solver == "ipopt" and run.control in ("volume", "pressure")
+        each = degree * (_BYTES_MINIMISED if minimised else _BYTES)
+        if count * each > SMALL:
+            require("mesh.elements", count, each, f"elements of degree {degree}")
+        steps = 0 if run is None else len(run.values or ()) or run.steps or 0
+        kept = 8 * (_PROFILES + 2) * count * degree + _BYTES_STEP
+        if steps * kept > SMALL:
+            require("run.steps" if run is not None and run.values is None else "run.values", steps, kept, "equilibria on this mesh")
 
     def _check_sources(self) -> None:
         R, Z = self.mesh.position(self.mesh.breakpoints())
@@ -640,18 +670,8 @@ def _optional(check: Any, key: str, value: Any) -> Any:
     return None if value is None else check(key, value)
 
 
-def _number(
-    key: str, value: Any, allowed: str = "a finite number is allowed", *, least: float = -math.inf, above: float = -math.inf
-) -> float:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise InputError(key, value, allowed)
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not (math.isfinite(number) and number >= least and number > above):
-        raise InputError(key, value, allowed)
-    return number
+def _finite(key: str, value: Any) -> float:
+    return number(key, value, _FINITE)
 
 
 def _whole(key: str, value: Any, *, most: int | None = None) -> int:
@@ -670,7 +690,7 @@ def _ratio(key: str, value: Any, scales: Scales | None) -> float:
     """R0/T as given, or as it follows from the scales."""
     if value is None:
         return _RADIUS_TO_THICKNESS if scales is None else scales.radius_to_thickness
-    ratio = _number(key, value, "a finite number > 0 is allowed (R0 over the reference thickness)", above=0)
+    ratio = number(key, value, "a finite number > 0 is allowed (R0 over the reference thickness)", above=0)
     if scales is None:
         return ratio
     if not math.isclose(ratio, scales.radius_to_thickness, rel_tol=AGREEMENT):
@@ -681,7 +701,7 @@ def _ratio(key: str, value: Any, scales: Scales | None) -> float:
 
 
 def _susceptibility(key: str, value: Any) -> float:
-    return _number(key, value, "a finite number >= 0 is allowed (2.5 in the paper)", least=0)
+    return number(key, value, "a finite number >= 0 is allowed (2.5 in the paper)", least=0)
 
 
 def _switch(key: str, value: Any) -> bool:
@@ -693,6 +713,10 @@ def _switch(key: str, value: Any) -> bool:
 def _text(key: str, value: Any) -> str:
     if not isinstance(value, str) or not _encodes(value):
         raise InputError(key, value, "a text (UTF-8) is allowed")
+    if len(value) > MAX_TEXT:
+        raise InputError(key, value, f"a text of up to {MAX_TEXT} characters is allowed; this one has {len(value)}")
+    if not all(c in "\t\n" or unicodedata.category(c) != "Cc" for c in value):
+        raise InputError(key, value, "a text without control characters is allowed (tabs and ends of lines are none)")
     return value
 
 
@@ -704,18 +728,22 @@ def _encodes(text: str) -> bool:
     return True
 
 
-def _sequence(key: str, values: Any, allowed: str) -> tuple[Any, ...]:
+def _sequence(key: str, values: Any, allowed: str, most: int = _MAX_ITEMS) -> tuple[Any, ...]:
     if isinstance(values, (str, bytes, Mapping)):
         raise InputError(key, values, allowed)
     try:
-        return tuple(values)
+        items = tuple(itertools.islice(values, most + 1))
     except TypeError:
         raise InputError(key, values, allowed) from None
+    if len(items) > most:
+        raise InputError(key, f"more than {most} entries", f"up to {most} are allowed")
+    return items
 
 
 def _loads(key: str, values: Any) -> tuple[float, ...]:
     allowed = "a list of one or more finite numbers is allowed"
-    result = tuple(_number(f"{key}[{k}]", value) for k, value in enumerate(_sequence(key, values, allowed)))
+    given = _sequence(key, values, allowed, MAX_STEPS)
+    result = tuple(number(f"{key}[{k}]", value, _FINITE) for k, value in enumerate(given))
     if not result:
         raise InputError(key, values, allowed)
     return result
@@ -726,9 +754,9 @@ def _target(key: str, value: Any) -> Target:
         raise InputError(
             key, value, "one quantity and its value are allowed, such as {center_height = 5.0}; known: " + ", ".join(QUANTITIES)
         )
-    ((quantity, number),) = value.items()
+    ((quantity, end),) = value.items()
     _choice(key, quantity, QUANTITIES)
-    return Target(quantity, _number(f"{key}.{quantity}", number))
+    return Target(quantity, number(f"{key}.{quantity}", end, _FINITE))
 
 
 def _choice(key: str, value: Any, known: Any) -> None:

@@ -157,7 +157,7 @@ scenes = st.builds(
     sources=st.lists(dipoles, max_size=3),
     susceptibility=st.floats(0, 10),
     radius_to_thickness=positive,
-    title=st.text(st.characters(codec="utf-8"), max_size=20),
+    title=st.text(st.characters(codec="utf-8", exclude_categories=["Cc"]), max_size=20),
     run=runs,
     analysis=analyses,
 )
@@ -316,7 +316,7 @@ REFUSED = [
     (plain(analysis={"stability": ["presure"]}), "analysis.stability[0]", "did you mean 'pressure'"),
     (plain(analysis={"stability": "pressure"}), "analysis.stability", "a list"),
     (plain(analysis={"stability": ["volume", "volume"]}), "analysis.stability", "once"),
-    (plain(analysis={"azimuthal_modes": [0]}), "analysis.azimuthal_modes[0]", ">= 1"),
+    (plain(analysis={"azimuthal_modes": [0]}), "analysis.azimuthal_modes[0]", "from 1 to 1000000"),
     (plain(analysis={"azimuthal_modes": [1, 2.0]}), "analysis.azimuthal_modes[1]", "whole number"),
     (plain(analysis={"azimuthal_modes": [True]}), "analysis.azimuthal_modes[0]", "whole number"),
     (plain(analysis={"azimuthal_modes": 1}), "analysis.azimuthal_modes", "a list"),

@@ -99,7 +99,7 @@ def test_window() -> None:
     """The slider takes the membrane to a step, under the camera and colours of all."""
     with picture.new_plotter(SMALL) as plotter:
         show.open_steps(plotter, list(branch()), "stretch_1", 2)
-        (slider,) = plotter.widgets.slider_widgets
+        (slider,) = getattr(plotter, "widgets", plotter).slider_widgets  # before pyvista 0.48 the plotter held them itself
         camera, limits = plotter.camera_position, plotter.actors["membrane"].mapper.scalar_range
         slider.GetRepresentation().SetValue(0.0)
         slider.InvokeEvent("InteractionEvent")

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from multiprocessing import active_children
 from pathlib import Path
 
@@ -382,7 +383,7 @@ def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on(tmp_path):
     until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in processes))
     with Kept(tmp_path / "out" / KEPT):
         pass
-    with sqlite3.connect(tmp_path / "out" / KEPT) as file:
+    with closing(sqlite3.connect(tmp_path / "out" / KEPT)) as file:
         (count,) = file.execute("SELECT count(*) FROM scene").fetchone()
     assert count >= 1
 
@@ -489,7 +490,7 @@ def test_the_command(tmp_path, capfd):
     assert "nothing to compute" in capfd.readouterr().out
     assert main([*words, "--over", f"{HEIGHT}=-5"]) == 2
     assert "each key once" in capfd.readouterr().err
-    with sqlite3.connect(out / "scenes.sqlite") as file:
+    with closing(sqlite3.connect(out / "scenes.sqlite")) as file:
         assert file.execute("SELECT count(*) FROM scene").fetchone() == (4,)
 
 

@@ -14,7 +14,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 #: each room may import those before it; what is left of the dot names a folder or a module
 ROOMS = (
-    ("errors", "threads", "native"),
+    ("errors", "memory", "threads", "native"),
     ("physics",),
     ("discretization",),
     ("scene",),

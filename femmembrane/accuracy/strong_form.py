@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import Disc
 from ..errors import InputError
-from ..physics.checks import is_number
+from ..physics.checks import convert, is_number, number
 from ..physics.loads import over_projection, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density
 from ..scene import Scene
@@ -176,10 +176,9 @@ class Guess:
 
     def __post_init__(self) -> None:
         for name in ("pressure", "center_height", "stretch"):
-            value = getattr(self, name)
-            if not is_number(value) or (name == "stretch" and value <= 0):
-                kind = "a finite number > 0" if name == "stretch" else "a finite number"
-                raise InputError(f"guess.{name}", value, f"{kind} is allowed")
+            positive = name == "stretch"
+            bound = {"above": 0.0} if positive else {}
+            convert(self, f"guess.{name}", f"a finite number{' > 0' if positive else ''} is allowed", **bound)
         if self.profile is not None and not {"r", "rho", "eta"} <= set(self.profile):
             raise InputError("guess.profile", sorted(self.profile), "columns r, rho and eta are needed")
 
@@ -268,9 +267,7 @@ def prescribed(volume: float | None, pressure: float | None, center_height: floa
     if len(chosen) != 1:
         raise InputError("control", [name for name, _ in chosen], "exactly one of volume, pressure and center_height is allowed")
     ((name, load),) = chosen
-    if not is_number(load):
-        raise InputError(name, load, "one finite number is allowed")
-    return name, float(load)
+    return name, number(name, load, "one finite number is allowed")
 
 
 def check_tolerance(key: str, value: Any, least: float) -> float:

@@ -17,7 +17,7 @@ from cyclopts import App, CycloptsError
 from .. import __version__
 from ..errors import InputError
 from . import completion, convergence, cost, export, report, run, scenes, sweep, view
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, drop, fail, no_room, open_streams
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
 
@@ -53,14 +53,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         The words after ``femmembrane``; those of the process by default.
     """
+    open_streams()
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; what a notebook has put there need not exist here
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
-    except BrokenPipeError:  # whoever reads the pipe has seen enough; Python would complain again when it flushes at its end
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads the pipe has seen enough
+        drop(sys.stdout)
         return DONE
-    except (InputError, OSError) as error:
+    except InputError as error:
+        return fail(BAD_INPUT, str(error))
+    except OSError as error:
+        try:
+            sys.stdout.flush()
+        except OSError:
+            drop(sys.stdout)
+        if no_room(error):
+            return fail(NOT_WRITTEN, f"results could not be written ({error.strerror or error}); make room")
         return fail(BAD_INPUT, str(error))
     except KeyboardInterrupt:
         return fail(INTERRUPTED, "interrupted; nothing was written")

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import Changes, prepare, read
 from .interrupts import Interrupts
-from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
+from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused
 
 
 def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
@@ -48,7 +48,7 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
             study.write_csv(written[0])
             study.plot(written[1])
         except (InputError, OSError) as error:
-            return fail(NOT_WRITTEN, not_written(error, out))
+            return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if study.messages:
         return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
     if sys.stdout.isatty():

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import Changes, prepare, read
 from .interrupts import Interrupts
-from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
+from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused
 
 
 def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False) -> int:
@@ -43,7 +43,7 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
             study.write_csv(out / "cost.csv")
             study.plot(out / "cost.png")
         except (InputError, OSError) as error:
-            return fail(NOT_WRITTEN, not_written(error, out))
+            return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if sys.stdout.isatty():
         sys.stdout.write(f"{study}\n")
     return DONE

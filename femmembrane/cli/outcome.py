@@ -2,18 +2,66 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from pathlib import Path
+from typing import TextIO
 
-from ..errors import InputError, Status
+from ..errors import InputError, NotWrittenError, Status
 
 DONE, BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, INTERRUPTED = 0, 2, 3, 4, 130
 
 
 def fail(code: int, message: str) -> int:
     line = " ".join(message.split())
-    sys.stderr.write(f"femmembrane: {line}\n")
+    try:
+        sys.stderr.write(f"femmembrane: {line}\n")
+        sys.stderr.flush()
+    except OSError:  # nobody can be told; the exit code stays
+        drop(sys.stderr)
     return code
+
+
+def open_streams() -> None:
+    """Streams that whoever started the process has closed lead nowhere; a file opened later cannot take their place.
+
+    What cannot be encoded for the reader of the output is written as an escape.
+    """
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        if getattr(sys, name) is not None:
+            continue
+        try:
+            os.fstat(number)
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+        setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  # as long as the process
+    if reconfigure := getattr(sys.stdout, "reconfigure", None):
+        reconfigure(errors="backslashreplace")
+
+
+def drop(stream: TextIO) -> None:
+    """Whatever a stream still holds leads nowhere, where Python would complain again when it flushes at its end."""
+    try:
+        number = stream.fileno()
+    except (OSError, ValueError):  # a stream of Python alone
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, number)
+    os.close(nowhere)
+
+
+def refused(error: BaseException) -> bool:
+    """Whether an error says that the system did not take what was to be written, and nothing of what that was."""
+    return isinstance(error.__cause__ if isinstance(error, InputError) else error, OSError)
+
+
+def no_room(error: OSError) -> bool:
+    """Whether an error says that there is no room for what was to be written."""
+    return isinstance(error, NotWrittenError) or error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def explain(status: Status, message: str) -> str:
@@ -26,5 +74,8 @@ def count(number: int) -> str:
 
 
 def not_written(error: Exception, out: Path) -> str:
-    text = error.allowed if isinstance(error, InputError) else getattr(error, "strerror", None) or str(error)
+    if isinstance(error, InputError):
+        text = error.allowed if refused(error) else str(error)
+    else:
+        text = getattr(error, "strerror", None) or str(error)
     return f"results could not be written to {out} ({text})"

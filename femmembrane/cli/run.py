@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError, SolveError, Status
 from .folders import Changes, prepare, read
 from .interrupts import Interrupts
-from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused
 from .progress import observer
 from .report import write as write_report
 
@@ -66,7 +66,7 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
             if report:
                 written.append(write_report(out))
         except (InputError, OSError) as error:
-            return fail(NOT_WRITTEN, _kept(error, checkpoints, out))
+            return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, _kept(error, checkpoints, out))
         if code != INTERRUPTED:
             checkpoints.remove()
     if interrupts.caught:
@@ -145,8 +145,10 @@ def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:
     with suppress(InputError, OSError):
         checkpoints.save()
     saved = checkpoints.path.exists()
-    advice = f"the computation is kept in {checkpoints.path.name}: make room, and --resume writes the rest" if saved else "make room"
-    return f"{not_written(error, out)}; {advice}"
+    kept = f"the computation is kept in {checkpoints.path.name}"
+    if not refused(error):
+        return f"{not_written(error, out)}" + (f"; {kept}" if saved else "")
+    return f"{not_written(error, out)}; " + (f"{kept}: make room, and --resume writes the rest" if saved else "make room")
 
 
 def _summary(branch: Branch, written: Sequence[Path]) -> str:

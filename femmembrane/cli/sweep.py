@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ..errors import InputError
 from .folders import Changes, prepare, read
 from .interrupts import Interrupts
-from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, refused
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -107,7 +107,7 @@ def sweep(
             if len(written) > 1:
                 found.plot(written[1])
         except (InputError, OSError) as error:
-            return fail(NOT_WRITTEN, not_written(error, out))
+            return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if not results:
         return fail(NOT_CONVERGED, f"no scene has a result; the reasons are in {written[0]}")
     if sys.stdout.isatty():

@@ -331,7 +331,7 @@ def write_meridian(mesh: Meridian, path: str | PathLike[str], *, curved: bool = 
 def _array(points: Any) -> Array:
     try:
         array = np.asarray(points, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.zeros(0)
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < 2:
         raise InputError("mesh.points", points, "two or more points (R, Z) are allowed")

@@ -25,12 +25,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from numbers import Real
 from typing import Any, Self
 
 import numpy as np
 
 from ..errors import InputError
+from ..physics.checks import as_float
 from .meridian import ELEMENTS, Array, check_elements, check_ratio, geometric_ends, graded_alike
 from .supports import POLE, SUPPORTS, Support, check_support
 
@@ -237,7 +237,7 @@ class Cylinder(_Graded):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _convert(self, "length", above=0, below=1e6)
+        _convert(self, "length", above=1e-9, below=1e6)
 
     @property
     def shape(self) -> str:
@@ -332,6 +332,6 @@ def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
 def _convert(mesh: Any, name: str, *, above: float, below: float) -> None:
     """Turn an argument into a float between two bounds, or raise InputError."""
     value = getattr(mesh, name)
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not above < float(value) < below:
+    if not above < as_float(value) < below:
         raise InputError(f"mesh.{name}", value, f"a number between {above:g} and {below:g} is allowed (in units of R0)")
     object.__setattr__(mesh, name, float(value))

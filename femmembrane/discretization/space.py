@@ -9,7 +9,7 @@ bandwidth. Points are numbered quadrature point first, element second: with arra
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any, cast
 
@@ -22,6 +22,7 @@ from skfem.quadrature import get_quadrature
 
 from ..errors import InputError
 from ..physics.magnetics import acting_sources
+from ..threads import cached_property
 from .meridian import LEAST_LENGTH, Array, Meridian, extent, side
 from .supports import as_support, floats, free_rotations
 

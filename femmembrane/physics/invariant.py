@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .checks import is_number
+from .checks import convert
 from .materials import NeoHookean
 
 _DOUBLE = NeoHookean()  # J/2, with its derivatives
@@ -70,8 +70,7 @@ class Yeoh(InvariantMaterial):
 
     def __post_init__(self) -> None:
         for name in ("c2", "c3"):
-            if not is_number(getattr(self, name)):
-                raise InputError(f"material.{name}", getattr(self, name), "a finite number is allowed (in units of the shear modulus)")
+            convert(self, f"material.{name}", "a finite number is allowed (in units of the shear modulus)")
         reason = "the stress does not grow with the stretch (Baker-Ericksen) at every stretch otherwise"
         if self.c3 < 0:
             raise InputError("material.c3", self.c3, f"a number >= 0 is allowed: {reason}")
@@ -102,9 +101,8 @@ class Gent(InvariantMaterial):
     jm: float
 
     def __post_init__(self) -> None:
-        if not (is_number(self.jm) and self.jm > 0):
-            reason = "the membrane locks at I1 - 3 = J_m, which is 0 at rest (neo-hookean never locks)"
-            raise InputError("material.jm", self.jm, f"a finite number > 0 is allowed: {reason}")
+        reason = "the membrane locks at I1 - 3 = J_m, which is 0 at rest (neo-hookean never locks)"
+        convert(self, "material.jm", f"a finite number > 0 is allowed: {reason}", above=0)
 
     def function(self, J: Any) -> tuple[Any, Any, Any]:
         log = np.log1p(-J / self.jm)
@@ -138,9 +136,8 @@ class ArrudaBoyce(InvariantMaterial):
     links: float
 
     def __post_init__(self) -> None:
-        if not (is_number(self.links) and self.links > 1):
-            reason = "a chain of N links has sqrt(N) times its length at rest when it is straight"
-            raise InputError("material.links", self.links, f"a finite number > 1 is allowed: {reason}")
+        reason = "a chain of N links has sqrt(N) times its length at rest when it is straight"
+        convert(self, "material.links", f"a finite number > 1 is allowed: {reason}", above=1)
 
     def function(self, J: Any) -> tuple[Any, Any, Any]:
         # in powers of J = I_1 - 3 all coefficients are positive, and nothing cancels
@@ -172,9 +169,8 @@ class Fung(InvariantMaterial):
     b: float
 
     def __post_init__(self) -> None:
-        if not (is_number(self.b) and self.b > 0):
-            reason = "below 0 the stress dies out at large stretches, and 0 is neo-hookean"
-            raise InputError("material.b", self.b, f"a finite number > 0 is allowed: {reason}")
+        reason = "below 0 the stress dies out at large stretches, and 0 is neo-hookean"
+        convert(self, "material.b", f"a finite number > 0 is allowed: {reason}", above=0)
 
     def function(self, J: Any) -> tuple[Any, Any, Any]:
         slope = np.exp(self.b * J) / 2

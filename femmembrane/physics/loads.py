@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InputError
-from .checks import is_number
+from .checks import convert, is_number
 
 
 def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:
@@ -97,8 +97,7 @@ class Hydrostatic(Load):
     gamma: float
 
     def __post_init__(self) -> None:
-        if not is_number(self.gamma):
-            raise InputError("load.gamma", self.gamma, "a finite number is allowed (density times gravity, times R0^2/(mu T))")
+        convert(self, "load.gamma", "a finite number is allowed (density times gravity, times R0^2/(mu T))")
 
     @property
     def acts(self) -> bool:
@@ -126,8 +125,7 @@ class Weight(Load):
     weight: float
 
     def __post_init__(self) -> None:
-        if not is_number(self.weight):
-            raise InputError("load.weight", self.weight, "a finite number is allowed (mass density times gravity, times R0/mu)")
+        convert(self, "load.weight", "a finite number is allowed (mass density times gravity, times R0/mu)")
 
     @property
     def acts(self) -> bool:
@@ -160,8 +158,7 @@ class HubForce(Load):
     sees = frozenset()
 
     def __post_init__(self) -> None:
-        if not is_number(self.force):
-            raise InputError("load.force", self.force, "a finite number is allowed (over mu T R0; positive lifts the hub)")
+        convert(self, "load.force", "a finite number is allowed (over mu T R0; positive lifts the hub)")
         if self.hub is not None and (not isinstance(self.hub, str) or self.hub not in _HUBS):
             raise InputError("load.hub", self.hub, "'first' or 'last' is allowed, or nothing where there is one hub")
 

@@ -9,7 +9,7 @@ M = mu0 D^2/(R0^6 mu) contributes sqrt(M) times its unit field. Several sources 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .checks import is_number
+from .checks import as_float, convert
 from .outline import Outline
 
 Array = NDArray[np.float64]
+
+#: a strength enters once, and grows with the sixth power of a small radius when it follows from a moment in A m^2
+_STRONGEST = 1e100
 
 
 class Source:
@@ -116,19 +119,19 @@ def check_source(source: Any) -> None:
     InputError
     """
     lengths = "a finite number > 0 is allowed (in units of R0)"
-    rules: dict[str, tuple[Callable[[float], bool], str]] = {
-        "strength": (lambda v: v >= 0, "a finite number >= 0 is allowed"),
-        "height": (lambda v: True, "a finite number is allowed (in units of R0; negative is below)"),
-        "radius": (lambda v: v > 0, lengths),
-        "length": (lambda v: v > 0, lengths),
+    rules: dict[str, tuple[str, dict[str, float]]] = {
+        "strength": ("a finite number >= 0 is allowed", {"least": 0.0, "most": _STRONGEST}),
+        "height": ("a finite number is allowed (in units of R0; negative is below)", {}),
+        "radius": (lengths, {"above": 0.0}),
+        "length": (lengths, {"above": 0.0}),
     }
-    for name, (good, allowed) in rules.items():
-        value = getattr(source, name, 1.0)
-        if not (is_number(value) and good(value)):
-            raise InputError(f"source.{name}", value, allowed)
-    orientation = getattr(source, "orientation", 1)
-    if isinstance(orientation, bool) or orientation not in (1, -1):
-        raise InputError("source.orientation", orientation, "1 or -1 is allowed")
+    for name, (allowed, bounds) in rules.items():
+        if hasattr(source, name):
+            convert(source, f"source.{name}", allowed, **bounds)
+    if hasattr(source, "orientation"):
+        if as_float(source.orientation) not in (1.0, -1.0):
+            raise InputError("source.orientation", source.orientation, "1 or -1 is allowed")
+        object.__setattr__(source, "orientation", int(source.orientation))
 
 
 def acting_sources(sources: Sequence[Source], susceptibility: Any) -> tuple[Source, ...]:
@@ -163,7 +166,8 @@ def swept(before: Array, after: Array, circle: tuple[float, float]) -> bool:
 
 def distance_to_polyline(rho: Array, eta: Array, circle: tuple[float, float]) -> float:
     """Smallest distance of a point of the half-plane (a circle around the axis) from a meridian of straight pieces, shape (n,) each."""
-    ends = np.stack([rho, eta]) - np.array(circle)[:, None]
-    along = np.diff(ends)
+    points = np.stack([rho, eta])
+    along = np.diff(points)  # before they are moved: beside a circle that is far away they would be one
+    ends = points - np.array(circle)[:, None]
     share = np.clip(-(ends[:, :-1] * along).sum(axis=0) / (along**2).sum(axis=0), 0, 1)
     return float(np.hypot(*(ends[:, :-1] + share * along)).min())

@@ -9,15 +9,13 @@ It must have W = 0 and dW/de = 0 at rest and shear modulus 1, that is W ~ e_1^2 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import InputError
-from .checks import is_number
+from .checks import convert, number
 
 
 class Material(Protocol):
@@ -164,9 +162,8 @@ class MooneyRivlin(OgdenForm):
     ratio: float
 
     def __post_init__(self) -> None:
-        if not (is_number(self.ratio) and self.ratio >= 0):
-            reason = "the stress does not grow with the stretch (Baker-Ericksen) at every stretch otherwise"
-            raise InputError("material.ratio", self.ratio, f"a finite number C2/C1 >= 0 is allowed: {reason}")
+        reason = "the stress does not grow with the stretch (Baker-Ericksen) at every stretch otherwise"
+        convert(self, "material.ratio", f"a finite number C2/C1 >= 0 is allowed: {reason}", least=0)
 
     def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
         twice = 1 / (1 + self.ratio)  # 2 C_1
@@ -179,12 +176,14 @@ def _powers(alpha: float, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
 
 
 def _numbers(key: str, values: Any) -> tuple[float, ...]:
+    allowed = "a list of one or more finite numbers is allowed"
     try:
-        # a text is a sequence, and a truth value a number, to float() alone
-        given = () if isinstance(values, (str, bytes)) else tuple(values)
-        result = tuple(float(v) for v in given if isinstance(v, Real) and not isinstance(v, bool))
-    except (TypeError, OverflowError):
-        raise InputError(key, values, "a list of finite numbers is allowed") from None
-    if not result or len(result) < len(given) or not all(math.isfinite(v) for v in result):
-        raise InputError(key, values, "a list of one or more finite numbers is allowed")
-    return result
+        given = () if isinstance(values, (str, bytes)) else tuple(values)  # a text is a sequence as well
+    except TypeError:
+        given = ()
+    if not given:
+        raise InputError(key, values, allowed)
+    try:
+        return tuple(number(key, value, allowed) for value in given)
+    except InputError as error:
+        raise InputError(key, values, error.allowed) from None

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
-from .checks import is_number
+from .checks import as_float, is_number
 from .magnetics import Dipole
 
 #: SI unit of every quantity
@@ -76,7 +76,7 @@ class Scales:
             value = getattr(self, name)
             if name == "dipole_moment" and value is None:
                 continue
-            if not (is_number(value) and float(value) > 0):
+            if not (is_number(value) and as_float(value) > 0):  # of any size: what follows from them is what counts
                 raise InputError(f"scales.{name}", value, f"a finite number > 0 is allowed (in {unit[name]})")
             object.__setattr__(self, name, float(value))
         for quantity in UNITS.keys() - {"dipole_strength"}:

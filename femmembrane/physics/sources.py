@@ -100,6 +100,7 @@ class Solenoid(Source):
         check_source(self)
         if isinstance(self.loops, bool) or not isinstance(self.loops, (int, np.integer)) or not 1 <= self.loops <= 64:
             raise InputError("source.loops", self.loops, "a whole number from 1 to 64 is allowed")
+        object.__setattr__(self, "loops", int(self.loops))
 
     @property
     def circles(self) -> tuple[tuple[float, float], ...]:  # type: ignore[override]  # read only here, and there

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .checks import is_number
+from .checks import LARGEST, as_float
 from .magnetics import Source, check_source
 
 _MAX_DEGREE = 40
@@ -62,8 +62,9 @@ class Tabulated(Source):
 
     def __post_init__(self) -> None:
         check_source(self)
-        if not is_number(self.tolerance) or not 1e-10 <= self.tolerance <= 0.1:
+        if not 1e-10 <= as_float(self.tolerance) <= 0.1:
             raise InputError("source.tolerance", self.tolerance, "a number from 1e-10 to 0.1 is allowed")
+        object.__setattr__(self, "tolerance", float(self.tolerance))
         for name in ("rho", "z"):
             values = _array(name, getattr(self, name), 1)
             if values.size < 3 or not (np.diff(values) > 0).all() or (name == "rho" and values[0] < 0):
@@ -168,9 +169,9 @@ def _harmonics(rho: Any, z: Any, degree: int) -> tuple[list[Any], list[Any]]:
 def _array(name: str, values: Any, dimensions: int) -> Array:
     try:
         array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.full((), np.nan)
-    if array.ndim != dimensions or not np.isfinite(array).all():
+    if array.ndim != dimensions or not (np.abs(array) <= LARGEST).all():
         kind = "a list of finite numbers" if dimensions == 1 else "lists of finite numbers, one for each radius and all of one length,"
         raise InputError(f"source.{name}", values, f"{kind} {'is' if dimensions == 1 else 'are'} allowed")
     return array

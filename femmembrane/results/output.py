@@ -171,4 +171,5 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
 def _write_json(facts: dict[str, Any], path: Path) -> None:
     text = json.dumps(facts, indent=2, ensure_ascii=False)
     with replace_file(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        # a name in the command that is no UTF-8 becomes the escape that JSON has for it
+        temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")

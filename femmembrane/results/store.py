@@ -177,7 +177,7 @@ def save(branch: Branch, path: str | PathLike[str]) -> None:
     image = io.BytesIO()  # HDF5 itself does not survive a full disk: it is met here, by one plain write
     dataset.to_netcdf(image, engine="h5netcdf", encoding=encoding)
     with replace_file(path) as temporary:
-        temporary.write_bytes(image.getbuffer())
+        temporary.write_bytes(image.getvalue())  # a view of it would outlive it when the write fails
 
 
 def load(path: str | PathLike[str]) -> Branch:

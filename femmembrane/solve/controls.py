@@ -6,15 +6,13 @@ one, N(x, P) = 0. Every control is solved by the same bordered Newton corrector.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import Protocol
 
 import numpy as np
 
 from ..discretization.space import Space
-from ..errors import InputError
+from ..physics.checks import convert
 from ..potential import Array, Evaluation
 
 
@@ -86,16 +84,9 @@ class Gas:
     atmosphere: float = 0.0
 
     def __post_init__(self) -> None:
-        for key in ("amount", "chamber", "atmosphere"):
-            value = getattr(self, key)
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, Real)
-                or not math.isfinite(value)
-                or value < 0
-                or (value == 0 and key != "atmosphere")
-            ):
-                raise InputError(f"gas.{key}", value, f"a finite number {'>=' if key == 'atmosphere' else '>'} 0 is allowed")
+        convert(self, "gas.amount", "a finite number > 0 is allowed", above=0)
+        convert(self, "gas.chamber", "a finite number > 0 is allowed", above=0)
+        convert(self, "gas.atmosphere", "a finite number >= 0 is allowed", least=0)
 
     def pressure(self, volume: float) -> float:
         """Pressure over the atmosphere at a volume of the membrane."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from threading import Lock
 from typing import Any
 
 import casadi as ca
@@ -17,7 +16,8 @@ import numpy as np
 
 from ..discretization.space import HESSIAN_PAIRS
 from ..errors import Status
-from ..potential import Array, Evaluation, Potential, vectorise
+from ..potential import BUILDING, Array, Evaluation, Potential, vectorise
+from ..threads import Guard
 from .banded import negative_directions
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct
@@ -95,7 +95,7 @@ class _Solver:
 
     def __init__(self, function: ca.Function) -> None:
         n, m = function.numel_in(0), function.numel_out(2)
-        self._lock = Lock()
+        self._lock = Guard()
         self._x, self._parameters = np.zeros(n), np.zeros(6)
         self._target, self._multiplier = np.zeros(m), np.zeros(m)
         free = np.full(n, np.inf)
@@ -121,6 +121,7 @@ class _Solver:
 
 
 @lru_cache(maxsize=32)
+@BUILDING
 def _solver(potential: Potential, constrained: bool, max_iterations: int) -> _Solver:
     functions = nlp_functions(potential)
     y, p = ca.MX.sym("y", potential.space.n_free), ca.MX.sym("p", 6)
@@ -182,6 +183,7 @@ def is_minimum(potential: Potential, control: Control, evaluation: Evaluation) -
 
 
 @lru_cache(maxsize=32)
+@BUILDING
 def nlp_functions(potential: Potential) -> NlpFunctions:
     """Assemble the point functions of a potential into functions of all unknowns; built once."""
     space, n = potential.space, potential.n_points

@@ -191,7 +191,7 @@ class Segment:
         if value == 0 and self._through_flat:
             a, b = self.value(quantity, self.a), self.value(quantity, self.b)
             return replace(self.a, state=flat_state(self.potential), sigma=self.a.sigma + self.length * a / (a - b))
-        share = brentq(lambda s: self.value(quantity, self.at(s)) - value, low, high, xtol=1e-14, rtol=8.9e-16)
+        share = brentq(lambda s: self.value(quantity, self.at(s)) - value, low, high, xtol=1e-14, rtol=8.9e-16, disp=False)
         point = self.at(share)
         pressure = value if quantity == "pressure" else point.state.pressure
         exact = correct(self.potential, _CONTROLS[quantity](value), point.state.x, pressure, tolerance=_EXACT)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
+from ..scene import MAX_WAVES
 from ..solve.finer import counterpart, transferred
 from .azimuthal import azimuthal_verdict, mode_in
 from .resolution import small_eigenvalue
@@ -46,8 +47,8 @@ def judge(
     InputError
         When neither or both of control and azimuthal are given, or one is unknown.
     """
-    if isinstance(azimuthal, bool) or not isinstance(azimuthal, (int, np.integer)) or azimuthal < 0:
-        raise InputError("azimuthal", azimuthal, "a whole number >= 0 is allowed")
+    if isinstance(azimuthal, bool) or not isinstance(azimuthal, (int, np.integer)) or not 0 <= azimuthal <= MAX_WAVES:
+        raise InputError("azimuthal", azimuthal, f"a whole number from 0 to {MAX_WAVES} is allowed")
     if azimuthal and control is not None:
         raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
     if not azimuthal and control is None:

@@ -11,7 +11,6 @@ lower bound decide.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
@@ -19,6 +18,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from ..native import native
 from ..potential import Array
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from ..threads import cached_property
 
 #: a gap below the eigenvalue found, relative to it, in which inertia must find nothing
 _GAP = 1e-4

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..potential import Potential
-from ..scene import Scene
+from ..scene import MAX_STEPS, Scene
 
 ILL_POSED = ("stop", "mark")
 
@@ -21,9 +21,9 @@ def check_scene(scene: Any) -> None:
 
 
 def check_max_steps(max_steps: Any) -> None:
-    """Raise InputError unless a largest number of steps is a whole number >= 1."""
-    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or max_steps < 1:
-        raise InputError("max_steps", max_steps, "a whole number >= 1 is allowed")
+    """Raise InputError unless a largest number of steps is a whole number from 1 to MAX_STEPS."""
+    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or not 1 <= max_steps <= MAX_STEPS:
+        raise InputError("max_steps", max_steps, f"a whole number from 1 to {MAX_STEPS} is allowed")
 
 
 def check_ill_posed(ill_posed: Any) -> None:

@@ -118,16 +118,19 @@ class FoldCurve:
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Pressure and volume of the fold against the number as a Matplotlib figure, also written to ``path`` if given."""
+        from ..results.store import replace_file
+        from ..views.backend import drawing, load, title_text
+
+        load()
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
-
-        from ..results.store import replace_file
 
         figure = Figure(figsize=(6.4, 6.0), layout="constrained")
         FigureCanvasAgg(figure)
         panels = figure.subplots(2, 1, sharex=True)
         title = self.equilibria[0].scene.title if self.equilibria else ""
-        figure.suptitle(title.replace("$", r"\$") or _FOLD_NAMES[self.kind][0].upper() + _FOLD_NAMES[self.kind][1:], fontsize=11)
+        heading = title_text(title) or _FOLD_NAMES[self.kind][0].upper() + _FOLD_NAMES[self.kind][1:]
+        figure.suptitle(heading, fontsize=11, wrap=True, parse_math=False)
         labels = {"pressure": "pressure at the fold P = pR₀/(μT)", "volume": "volume at the fold V/R₀³"}
         for axes, (name, label) in zip(panels, labels.items(), strict=True):
             self._draw(axes, name)
@@ -135,7 +138,7 @@ class FoldCurve:
         panels[-1].set_xlabel(_label(self.parameter))
         panels[0].legend(fontsize=9, framealpha=0.9, edgecolor="none")
         if path is not None:
-            with replace_file(path) as temporary:
+            with replace_file(path) as temporary, drawing():
                 figure.savefig(temporary, dpi=160)
         return figure
 
@@ -334,7 +337,7 @@ def _bounds(parameter: Parameter, bounds: tuple[float, float], direction: int) -
         raise InputError("direction", direction, "1 (towards larger values) or -1 is allowed")
     try:
         low, high = (float(b) for b in bounds)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("bounds", bounds, "two finite numbers, smallest and largest, are allowed") from None
     if not (np.isfinite([low, high]).all() and low < high):
         raise InputError("bounds", bounds, "two finite numbers, smallest and largest, are allowed")

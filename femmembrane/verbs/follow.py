@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from ..accuracy.adapt import spread
 from ..errors import InputError, SolveError, Status, unknown_name
+from ..physics.checks import LARGEST, number
 from ..potential import Array, Potential, potential_of
 from ..results.checkpoint import same_scene
 from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
-from ..scene import Scene
+from ..scene import MAX_STEPS, Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
@@ -138,9 +139,7 @@ def equilibrium(
         return _in_gas(scene, gas, start)
     ((control, load),) = given.items()
     key = {"height": "center_height"}.get(control, control)
-    if np.ndim(load) or not isinstance(load, (int, float, np.number)) or isinstance(load, bool) or not np.isfinite(load):
-        raise InputError(key, load, "one finite number is allowed")
-    value = np.array([float(load)])
+    value = np.array([number(key, load, "one finite number is allowed")])
     return _follow(scene, control, value, start, solver, True, None)[0]
 
 
@@ -195,10 +194,14 @@ def run(
 def _loads(key: str, values: ArrayLike) -> Array:
     try:
         loads = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(key, values, "numbers are allowed") from None
     if loads.ndim != 1 or not loads.size or not np.isfinite(loads).all():
         raise InputError(key, values, "one or more finite numbers are allowed")
+    if not (np.abs(loads) <= LARGEST).all():
+        raise InputError(key, values, f"finite numbers are allowed, of a size up to {LARGEST:g}")
+    if loads.size > MAX_STEPS:
+        raise InputError(key, f"{loads.size} numbers", f"up to {MAX_STEPS} are allowed")
     return loads
 
 

@@ -10,6 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..physics.checks import LARGEST
+
+#: scenes of a sweep: each is checked and has a key before the first is computed
+MAX_SCENES = 10**5
+#: names in a key
+_DEPTH = 20
 
 
 def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
@@ -29,7 +35,7 @@ def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     InputError
         For a key that leads nowhere.
     """
-    if not isinstance(key, str) or not all(key.split(".")):
+    if not isinstance(key, str) or not all(key.split(".")) or key.count(".") >= _DEPTH:
         raise InputError("key", key, "the place of a value in a scene file is allowed, such as mesh.elements or source.0.strength")
     changed = dict(tables)
     place: Any = changed
@@ -64,8 +70,10 @@ def values_of(option: str, text: str) -> tuple[str, tuple[Any, ...]]:
         ends, number = (float(start), float(stop)), int(count)
     except ValueError:
         raise InputError(option, text, allowed) from None
-    if not np.isfinite(ends).all() or number < 1 or (number > 1) == (ends[0] == ends[1]):
-        raise InputError(option, text, "START:STOP:COUNT takes two different finite numbers and a whole number >= 2")
+    if max(abs(end) for end in ends) > LARGEST or not np.isfinite(ends).all() or number < 1 or (number > 1) == (ends[0] == ends[1]):
+        raise InputError(option, text, f"START:STOP:COUNT takes two different numbers of a size up to {LARGEST:g} and a whole number >= 2")
+    if number > MAX_SCENES:
+        raise InputError(option, text, f"{number} values; a sweep of up to {MAX_SCENES} scenes is allowed")
     return key, tuple(np.linspace(*ends, number).tolist())
 
 

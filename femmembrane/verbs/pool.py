@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.process import BaseProcess
 
+import numpy as np
+
 from ..errors import InputError
 from ..scene import Scene
 from .quantities import UNEXPECTED, Options, Row, compute
@@ -24,6 +26,10 @@ from .quantities import UNEXPECTED, Options, Row, compute
 Task = tuple[str, Scene, str, Options]
 #: seconds in which a worker must have come
 _PATIENCE = 120.0
+#: processes of one sweep: as many as large machines have cores (Windows waits for no more than 61)
+MAX_WORKERS = 61 if os.name == "nt" else 1024
+#: what a process takes before it computes anything
+WORKER_BYTES = 100 * 2**20
 
 
 def cores() -> int:
@@ -84,7 +90,10 @@ def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]
         except ImportError as error:
             raise InputError("scheduler", address, f"its workers need femmembrane {_version()} ({error})") from None
         if found != {_version()}:
-            raise InputError("scheduler", address, f"its workers have femmembrane {', '.join(sorted(found))}; {_version()} is needed")
+            allowed = (
+                f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, or rows would hang on who computes them"
+            )
+            raise InputError("scheduler", address, allowed)
         with client.get_executor(pure=False) as executor:
             yield from _drive(executor, tasks, {}, lambda: max(16, 4 * sum(client.nthreads().values())))
 
@@ -124,11 +133,16 @@ def _try_out(executor: Executor, workers: int) -> None:
 
 
 def _version() -> str:
-    """The version, and which of its halves computes: they agree to round-off, not to the last bit."""
+    """The version, and what else decides the last bits: which half computes, with which NumPy and SciPy, on what kind of processor."""
+    import platform
+
+    import scipy
+
     from .. import __version__
     from ..native import native
 
-    return f"{__version__} ({'compiled' if native() else 'in NumPy'})"
+    half = "compiled" if native() else "in NumPy"
+    return f"{__version__} ({half}, NumPy {np.__version__}, SciPy {scipy.__version__}, {platform.machine()})"
 
 
 def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task], room: Callable[[], int]) -> Iterator[tuple[str, Row]]:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..errors import FemmembraneError, InputError, SolveError, Status, unknown_name
+from ..physics.checks import number
 from ..results.records import Branch, Equilibrium, SpecialPoint
 from ..scene import Analysis, Scene
 from .follow import equilibrium, run
@@ -92,8 +93,7 @@ def check(scene: Scene, quantity: str, options: Options) -> None:
         if len(given) != 1:
             raise InputError("quantity", quantity, "it takes exactly one of pressure and volume, such as pressure=1.8")
         ((name, load),) = given.items()
-        if isinstance(load, bool) or not isinstance(load, (int, float, np.number)) or not np.isfinite(load):
-            raise InputError(name, load, "a finite number is allowed")
+        number(name, load, "a finite number is allowed")
     elif given:
         raise InputError(*next(iter(given.items())), 'only quantity = "equilibria" takes a load; others take that of [run]')
     traced = quantity in TRACED

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
+from ..physics.checks import number
 from ..potential import potential_of
 from ..results.records import Equilibrium
 from ..scene import Scene
@@ -81,11 +82,10 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     if len(given) != 1:
         raise InputError("equilibria", sorted(given), "exactly one of pressure and volume is allowed")
     ((control, load),) = given.items()
-    if isinstance(load, bool) or not isinstance(load, (int, float, np.number)) or not np.isfinite(load):
-        raise InputError(control, load, "a finite number is allowed")
+    load = number(control, load, "a finite number is allowed")
     check_max_steps(max_steps)
     potential = potential_of(scene)
-    search = Search(potential, control, float(load), max_steps)
+    search = Search(potential, control, load, max_steps)
     search.run()
     found = [record(scene, potential, state) for state in search.states]
     energies = [eq.energy - eq.pressure * eq.volume * (control == "pressure") for eq in found]

@@ -18,12 +18,13 @@ import numpy as np
 
 from ..discretization.meridian import side
 from ..errors import InputError
+from ..memory import require
 from ..results.grid import dataset_of, load_dataset, save_dataset
 from ..results.kept import Kept
 from ..results.store import scene_text
 from ..scene import Scene
 from . import pool
-from .keys import set_key
+from .keys import MAX_SCENES, set_key
 from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
 
 if TYPE_CHECKING:
@@ -241,6 +242,7 @@ def plan_sweep(
     InputError
         As :func:`sweep`.
     """
+    processes = _workers(workers, None) or pool.cores()
     grid = _Grid.of(scene, over, quantity, Options(pressure, volume, direction))
     with ExitStack() as stack:
         kept = stack.enter_context(Kept(Path(out) / KEPT)) if out is not None and (Path(out) / KEPT).exists() else None
@@ -253,7 +255,7 @@ def plan_sweep(
             row = compute(changed, quantity, options)
             seconds += row.seconds
             _keep(kept, key, row)
-    return Plan(len(grid.distinct), len(known), seconds / max(len(chosen), 1), len(chosen), _workers(workers, None) or pool.cores())
+    return Plan(len(grid.distinct), len(known), seconds / max(len(chosen), 1), len(chosen), processes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +273,8 @@ class _Grid:
     def of(cls, scene: Scene, over: Mapping[str, Iterable[Any]], quantity: str, options: Options) -> _Grid:
         if not isinstance(scene, Scene):
             raise InputError("scene", scene, "a Scene is allowed")
-        tables, values = scene.to_dict(), _checked(over)
+        values = _checked(over)
+        tables = scene.to_dict()
         if quantity not in QUANTITIES or not values:  # the rest is asked of each scene below
             check(scene, quantity, options)
         keys = []
@@ -305,11 +308,17 @@ def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
         allowed = "one or more different numbers, booleans or texts of one kind are allowed"
         if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
             raise InputError(f"over[{key!r}]", values, allowed)
-        plain = tuple(v.item() if isinstance(v, np.generic) else v for v in values)
+        plain = tuple(v.item() if isinstance(v, np.generic) else v for v in itertools.islice(values, MAX_SCENES + 1))
+        if len(plain) > MAX_SCENES:
+            raise InputError(f"over[{key!r}]", f"more than {MAX_SCENES} values", f"a sweep of up to {MAX_SCENES} scenes is allowed")
         kinds = {float if type(v) is int else type(v) for v in plain}
         if len(kinds) != 1 or not kinds <= {float, bool, str} or len(set(plain)) < len(plain):
             raise InputError(f"over[{key!r}]", list(plain), allowed)
         checked[key] = plain
+    count = math.prod(len(values) for values in checked.values())
+    if count > MAX_SCENES:
+        sizes = " x ".join(str(len(values)) for values in checked.values())
+        raise InputError("over", list(checked), f"{sizes} values are {count} scenes; up to {MAX_SCENES} are allowed")
     return checked
 
 
@@ -340,8 +349,11 @@ def _workers(workers: Any, scheduler: Any) -> int | None:
         return None
     if scheduler is not None:
         raise InputError("workers", workers, "not together with scheduler: a cluster has its own")
-    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1:
-        raise InputError("workers", workers, "a whole number >= 1 is allowed")
+    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or not 1 <= workers <= pool.MAX_WORKERS:
+        raise InputError(
+            "workers", workers, f"a whole number from 1 to {pool.MAX_WORKERS} is allowed; this process may use {pool.cores()} cores"
+        )
+    require("workers", int(workers) - 1, pool.WORKER_BYTES, "more processes")
     return int(workers)
 
 

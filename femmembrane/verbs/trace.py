@@ -6,9 +6,8 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from ..errors import InputError, SolveError, Status, unknown_name
+from ..physics.checks import is_number, number
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
@@ -197,9 +196,8 @@ def _targets(until: Mapping[str, float] | None) -> dict[str, float]:
     for quantity, value in targets.items():
         if quantity not in QUANTITIES:
             raise unknown_name("until", quantity, QUANTITIES)
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not np.isfinite(value):
-            raise InputError(f"until.{quantity}", value, "a finite number is allowed")
-    return {quantity: float(value) for quantity, value in targets.items()}
+        targets[quantity] = number(f"until.{quantity}", value, "a finite number is allowed")
+    return targets
 
 
 @dataclass
@@ -256,12 +254,13 @@ class _Tracing:
             state = resume(potential, start)
         elif start is None:
             state = start_at_volume(potential, potential.space.reference_volume + moderate(potential))
-        elif isinstance(start, (int, float, np.number)) and not isinstance(start, bool) and np.isfinite(start):
-            if at_rest(potential, "volume", float(start)):
+        elif is_number(start):
+            volume = number("start", start, "a volume is allowed")
+            if at_rest(potential, "volume", volume):
                 raise InputError(
                     "start", start, "the flat unloaded membrane has no stiffness to start from; a small volume is allowed, such as 1e-3"
                 )
-            state = start_at_volume(potential, float(start))
+            state = start_at_volume(potential, volume)
         else:
             raise InputError("start", start, "a volume, an Equilibrium, a SpecialPoint or a traced Branch is allowed")
         tracing = cls(scene, potential, first_point(potential, state, direction), tracer, [], special, on_step, max_steps)

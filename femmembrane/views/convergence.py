@@ -66,8 +66,6 @@ def plot_convergence(
     InputError
         For an unknown quantity or axis, or a file that cannot be written.
     """
-    from matplotlib.patches import Patch
-
     if against not in AGAINST:
         raise unknown_name("against", str(against), AGAINST)
     first = "volume" if study.control == "pressure" else "pressure"
@@ -76,6 +74,8 @@ def plot_convergence(
         if name not in study.quantities:
             raise unknown_name("quantities", str(name), study.quantities)
     figure, axes = new_figure((3.3 * len(asked) + 0.4, 4.4), title=study.scene.title or " ", widths=(1.0,) * len(asked))
+    from matplotlib.patches import Patch
+
     handles: list[Any] = []
     for panel, name in zip(np.atleast_1d(axes), asked, strict=True):
         handles = _draw(panel, study, name, against)

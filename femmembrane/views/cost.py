@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from .backend import title_text
 from .plots import new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -68,8 +69,8 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
     look: dict[str, Any] = {"ncols": 4 if len(starts) > 1 else 2, "frameon": False, "fontsize": 8.5, "handlelength": 3.4}
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", **look)
     symbol = {"volume": "V", "pressure": "P", "center_height": "pole height"}[study.control]
-    title = f"{study.scene.title}, " if study.scene.title else ""
-    figure.suptitle(f"{title}{symbol} = {study.load:.6g}".replace("$", r"\$"), fontsize=11)
+    title = f"{title_text(study.scene.title)}, " if study.scene.title else ""
+    figure.suptitle(f"{title}{symbol} = {study.load:.6g}", fontsize=11, wrap=True, parse_math=False)
     return save_figure(figure, path)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
 from ..results.grid import MEANING
+from .backend import title_text
 from .plots import HEIGHT_LABEL, PRESSURE_LABEL, VOLUME_LABEL, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Seque
         figure.legend(
             list(handles.values()), list(handles), loc="outside lower center", frameon=False, fontsize=8.5, ncols=min(3, len(handles))
         )
-    figure.suptitle(sweep.scene.title.replace("$", r"\$"), fontsize=11)
+    figure.suptitle(title_text(sweep.scene.title), fontsize=11, wrap=True, parse_math=False)
     return save_figure(figure, path)
 
 
@@ -168,7 +169,7 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
     axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]), xlabel=_key_label(dims[0]), ylabel=_key_label(dims[1]))
     for key, positions, axis in ((dims[0], x, axes.xaxis), (dims[1], y, axes.yaxis)):
         if not _positions(data, key)[1]:
-            axis.set_ticks(positions, [str(v) for v in data[key].values])
+            axis.set_ticks(positions, [title_text(str(v)) for v in data[key].values], parse_math=False)
     axes.set_title(_label(name), fontsize=10)
     return _hatch(axes, x_edges, y_edges, reasons, grid, hatches)
 
@@ -225,7 +226,7 @@ def _draw_curve(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values:
     axes.set(xlabel=_key_label(key), ylabel=_label(name))
     axes.grid(color="0.92", linewidth=0.6)
     if not numbers:
-        axes.set_xticks(x, [str(v) for v in data[key].values[order]])
+        axes.set_xticks(x, [title_text(str(v)) for v in data[key].values[order]], parse_math=False)
     foot = np.nanmin(values) if np.isfinite(values).any() else 0.0
     handles = {}
     for reason in sorted(set(reasons) - {""}):

@@ -10,7 +10,6 @@ with (rho, eta) the equilibrium, (u, c, w) the mode and A the amplitude. An unst
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.store import replace_file
 from ..stability.verdict import Verdict
+from ..threads import cached_property
 from .picture import aim, circles, new_plotter, polydata
 from .stage import Box
 from .vtk import SECTORS, Array, Revolution, shown_length, smooth_profile, write_collection

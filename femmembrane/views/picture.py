@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, unknown_name
 from ..results.store import MEANING, replace_file
 from ..stability.zones import KINDS
+from .backend import load
 from .stage import Box, surroundings
 from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
 
@@ -149,6 +150,7 @@ def check_quantity(quantity: str, scene: Scene, key: str = "quantity") -> None:
 @contextmanager
 def new_plotter(size: tuple[int, int], off_screen: bool = True) -> Iterator[pyvista.Plotter]:
     """A white picture that is closed at the end."""
+    load()  # for its colour maps
     import pyvista
 
     with pyvista.vtk_verbosity("off"):  # VTK reports a missing display before it does without
@@ -237,6 +239,7 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
 
 def zone_colors() -> tuple[str, ...]:
     """One colour a kind of zones, from light to dark."""
+    load()
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 

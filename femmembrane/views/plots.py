@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
 from ..results.store import replace_file
+from .backend import drawing, load, title_text
 from .stage import Box, clamped_ends, surroundings
 from .vtk import smooth_profile
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, draw_meridian_zones, fill_zones, new_label, shown_kinds, zone_label, zone_order
@@ -121,13 +122,13 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
     InputError
         For an empty branch, a count below 1, or a file that cannot be written.
     """
-    from matplotlib import colormaps
-
     _require_equilibria(branch)
     if count < 1:
         raise InputError("count", count, "a whole number >= 1 is allowed")
-    shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, count).round().astype(int))]
+    shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, min(count, len(branch))).round().astype(int))]
     figure, axes = new_figure((6.4, 5.6), title=branch.scene.title)
+    from matplotlib import colormaps
+
     # lightness falls along the map, so that neighbours differ in grey as well
     colors = colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2)))
     for equilibrium, color in zip(shown, colors, strict=False):
@@ -187,6 +188,7 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
     figure : Figure
     axes : Axes, or array of Axes
     """
+    load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -195,11 +197,11 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
     row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
     for axes in row:
         axes.spines[["top", "right"]].set_visible(False)
-    text = title.replace("$", r"\$")
+    look: dict[str, Any] = {"fontsize": 11, "wrap": True, "parse_math": False}
     if len(widths) > 1:
-        figure.suptitle(text, fontsize=11)
+        figure.suptitle(title_text(title) or title, **look)  # a blank one leaves room
         return figure, row
-    row[0].set_title(text, fontsize=11, wrap=True)
+    row[0].set_title(title_text(title), **look)
     return figure, row[0]
 
 
@@ -211,7 +213,7 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
             raise InputError(
                 "path", str(path), "a name that ends in one of these is needed: " + ", ".join(f".{f}" for f in sorted(formats))
             )
-        with replace_file(path) as temporary:
+        with replace_file(path) as temporary, drawing():
             figure.savefig(temporary, dpi=_DPI)
     return figure
 

@@ -19,6 +19,7 @@ from ..errors import Status
 from ..results.store import replace_file
 from ..results.table import estimated
 from . import plots
+from .backend import load
 from .html import MOST_ROWS, branch_rows, pairs, table, text
 from .stage import Box
 from .style import STYLE
@@ -57,7 +58,7 @@ def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, 
     """
     page = report(branch, facts)
     with replace_file(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace")  # the command may hold names that are no UTF-8
 
 
 def report(branch: Branch, facts: Mapping[str, Any] | None = None) -> str:
@@ -299,6 +300,7 @@ def _legend_below(figure: Figure, axes: Any, columns: int = 1) -> None:
 
 
 def _profiles(branch: Branch) -> Figure:
+    load()
     from matplotlib import colormaps
 
     shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, _CURVES).round().astype(int))]

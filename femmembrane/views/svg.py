@@ -8,6 +8,8 @@ import re
 from html import escape
 from typing import TYPE_CHECKING
 
+from .backend import drawing, load
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -26,11 +28,12 @@ def inline_svg(figure: Figure, label: str, key: str) -> tuple[str, set[str]]:
     key : str
         Put before the ids in it, which must differ from those of the other figures of a page.
     """
+    load()
     from matplotlib import rc_context
 
     text = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with rc_context({"svg.hashsalt": "femmembrane", "svg.fonttype": "path", "svg.id": None}):
+    with rc_context({"svg.hashsalt": "femmembrane", "svg.fonttype": "path", "svg.id": None}), drawing():
         figure.savefig(text, format="svg", metadata=nothing, transparent=True)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]

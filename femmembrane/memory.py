@@ -1,0 +1,96 @@
+"""Room for what is asked for, found out before any of it is built.
+
+What a system gives away is not always there when it is used: a process that asks for too much is ended without a word. So the memory that
+a mesh, a run or a sweep takes at least is estimated first, and compared with what this process may still have.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from .errors import InputError
+
+#: bytes up to which nobody asks
+SMALL = 2**28
+
+
+def available() -> int | None:
+    """Bytes that this process may still have: of the machine, of its control group and of its own limits; None where nobody knows."""
+    known = [*_machine(), *_groups(), *_limits()]
+    return max(min(known), 0) if known else None
+
+
+def require(key: str, count: int, each: int, what: str) -> None:
+    """Raise InputError, with the number that is allowed, unless there is room for so many times so many bytes.
+
+    Parameters
+    ----------
+    key : str
+        Argument that says how many.
+    count, each : int
+        How many, and the bytes that each takes at least.
+    what : str
+        What they are, in the plural.
+    """
+    free = available()
+    if free is not None and count * each > free:
+        needed = f"{_size(count * each)} of memory at least are needed and {_size(free)} are there"
+        raise InputError(key, count, f"{needed}: up to {free // each} {what} are allowed")
+
+
+def _size(number: int) -> str:
+    return f"{number / 2**30:.3g} GiB"
+
+
+def _machine() -> Iterator[int]:
+    with suppress(OSError, ValueError, KeyError):
+        lines = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
+        yield 1024 * sum(int(lines[name].split()[0]) for name in ("MemAvailable", "SwapFree"))
+
+
+def _groups() -> Iterator[int]:
+    """Of the control groups that the process is in, and those around them."""
+    with suppress(OSError, ValueError):
+        for line in Path("/proc/self/cgroup").read_text().splitlines():
+            _, controllers, name = line.split(":", 2)
+            if controllers in ("", "memory"):
+                yield from _group(Path("/sys/fs/cgroup") / controllers, name, *_FILES[controllers])
+
+
+#: files with the limit and the use of a group, and the line of ``memory.stat`` with what it gives back when asked: of version 2 and 1
+_FILES = {
+    "": ("memory.max", "memory.current", "inactive_file"),
+    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+}
+
+
+def _group(root: Path, name: str, limit: str, use: str, spare: str) -> Iterator[int]:
+    folder = root / name.lstrip("/")
+    if not folder.is_dir():  # in a container its own group may be the root
+        folder = root
+    for place in (folder, *folder.parents):
+        with suppress(OSError, ValueError):  # "max" is no number: no limit
+            most = int((place / limit).read_text())
+            back = next((int(line.split()[1]) for line in (place / "memory.stat").read_text().splitlines() if line.startswith(spare)), 0)
+            yield most - int((place / use).read_text()) + back
+        if place == root:
+            return
+
+
+def _limits() -> Iterator[int]:
+    """Of the process itself, as the shell's ``ulimit`` sets them."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    with suppress(OSError, ValueError, IndexError):
+        size, *_, data, _ = (int(word) * resource.getpagesize() for word in Path("/proc/self/statm").read_text().split())
+        used: Any
+        for kind, used in ((resource.RLIMIT_AS, size), (resource.RLIMIT_DATA, data)):
+            most = resource.getrlimit(kind)[0]
+            if most != resource.RLIM_INFINITY:
+                yield most - used

@@ -98,6 +98,8 @@ class Space:
         or its arc length where that is smaller, of a closed curve its arc length over 2 pi. It is 1 for a disc, a sphere, and a torus.
     highest : ndarray, shape (n_quadrature,)
         The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
+    slenderness : float
+        Size of the meridian over ``unit``, at least 1: what digits positions lose beside displacements.
     weights : ndarray, shape (n_quadrature, n_elements)
         2 pi times the quadrature weight on the reference element.
     """
@@ -122,6 +124,7 @@ class Space:
         span = float(self.lengths.sum()) / (1 if mesh.supports() else 2 * np.pi)
         self._support(n_nodes)
         self.unit = min(float(mesh.position(self.ends)[0].max()), span)
+        self.slenderness = max(1.0, extent(*mesh.position(self.ends)) / self.unit)
         self._number(self.nodes[local])
         self._tabulate(points)
 

@@ -15,6 +15,9 @@ from .controls import ArcLengthControl, Control
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
+#: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it: one along which
+#: the membrane is so soft, such as a shift of a bulge in a long tube, that round-off decides it
+ROUND_OFF, SOFT = 2e-14, 1e-6
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 #: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
@@ -80,7 +83,7 @@ def correct(
         size = equations.size(dx)
         close, previously_close = size <= tolerance, previous <= tolerance
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
-        done = done and equations.balanced(dp)
+        done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
         stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
@@ -126,6 +129,12 @@ class Equations:
         if isinstance(self.control, ArcLengthControl):
             return True
         return bool(abs(self.gap) <= 1e-14 * (abs(self._row @ self.x) + abs(self._corner * self.pressure)))
+
+    @property
+    def at_round_off(self) -> bool:
+        """Whether no correction can be told from round-off: forces balance as far as positions are known, and the control is met."""
+        residual = relative_residual(self.potential, self.force, self.evaluation, self.pressure)
+        return residual <= ROUND_OFF * self.potential.space.slenderness and self.on_control
 
     def balanced(self, dp: float) -> bool:
         """Whether a correction of P changes no force."""

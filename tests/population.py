@@ -130,7 +130,18 @@ def draft(seed: int) -> Draft:
     )
 
 
-_FAMILIES = {"disc": 12, "annulus": 10, "cap": 12, "round cap": 4, "sphere": 6, "tube": 18, "torus": 9, "spheroid": 9, "curve": 12, "other unit": 12}
+_FAMILIES = {
+    "disc": 12,
+    "annulus": 10,
+    "cap": 12,
+    "round cap": 4,
+    "sphere": 6,
+    "tube": 18,
+    "torus": 9,
+    "spheroid": 9,
+    "curve": 12,
+    "other unit": 12,
+}
 
 
 def _family(dice: Dice) -> str:
@@ -152,7 +163,18 @@ def _disc(dice: Dice) -> tuple[dict[str, Any], float]:
 
 
 def _annulus(dice: Dice) -> tuple[dict[str, Any], float]:
-    ends = dice.one_of([("hub", "clamped"), ("hub", "clamped"), ("clamped", "clamped"), ("hub", "radial"), ("free", "clamped"), ("axial", "clamped"), ("clamped", "hub"), ("radial", "clamped")])
+    ends = dice.one_of(
+        [
+            ("hub", "clamped"),
+            ("hub", "clamped"),
+            ("clamped", "clamped"),
+            ("hub", "radial"),
+            ("free", "clamped"),
+            ("axial", "clamped"),
+            ("clamped", "hub"),
+            ("radial", "clamped"),
+        ]
+    )
     return {"shape": "annulus", "inner_radius": dice.number(0.08, 0.85), **_elements(dice), "inner": ends[0], "outer": ends[1]}, 1.0
 
 
@@ -287,6 +309,9 @@ def _loads(dice: Dice, bare: fm.Scene, unit: float) -> dict[str, Any]:
     force = {"kind": "hub-force", "force": sign * dice.log(0.02, 3) * unit}
     if dice.chance(0.5):
         force["hub"] = dice.one_of(["first", "last"])
+    if Potential(bare).space.pin is not None:  # nothing holds it along the axis: two hubs may be pulled apart, and nothing else
+        pair = [force | {"hub": "first"}, force | {"hub": "last", "force": -force["force"]}]
+        return {"load": pair} if [end.rigid for end in Potential(bare).space.supports] == [True, True] else {}
     for choice in sorted([[weight], [liquid], [force], [liquid, weight]], key=lambda _: dice.random()):
         tables = bare.to_dict() | {"load": choice}
         try:
@@ -323,9 +348,9 @@ def _sources(dice: Dice, bare: fm.Scene, unit: float) -> dict[str, Any]:
     chi, energy = dice.log(0.1, 3), dice.log(0.02, 1.5)
     scene = {"membrane": {"susceptibility": chi}}
     for source in chosen:
-        unit_source = {"dipole": fm.Dipole, "loop": fm.Loop, "solenoid": fm.Solenoid, "wire": fm.Wire, "uniform": fm.Uniform}[source["kind"]](
-            strength=1.0, **{k: v for k, v in source.items() if k != "kind"}
-        )
+        unit_source = {"dipole": fm.Dipole, "loop": fm.Loop, "solenoid": fm.Solenoid, "wire": fm.Wire, "uniform": fm.Uniform}[
+            source["kind"]
+        ](strength=1.0, **{k: v for k, v in source.items() if k != "kind"})
         most = float(np.max(unit_source.intensity(R, Z)))
         source["strength"] = float(f"{2 * energy / (chi * most * len(chosen)):.6g}")
     return scene | {"source": chosen}
@@ -452,6 +477,9 @@ def _outward(walker: Walker) -> Any:
     for support, to_end, pole in zip(space.supports, (along, 1 - along), space.on_axis, strict=False):
         if not pole and support.held:
             fall = fall * np.sin(np.pi / 2 * np.minimum(1.0, to_end / 0.5))
+    # towards the axis no farther than it is away
+    R = space.mesh.position(s)[0]
+    fall = fall * (1 - np.maximum(tangent[1], 0.0) * (1 - np.tanh(R / walker.size)))
     return space.interpolate(-tangent[1] * fall, tangent[0] * fall)
 
 

@@ -57,7 +57,9 @@ class Walker:
         space = self.space
         self.kd, self.n = space.half_bandwidth, space.n_free
         self.mass = dense(potential.mass, self.kd) / potential.area
-        self.size = float(np.hypot(space.R, space.Z - space.Z.mean()).max())
+        R, Z = space.mesh.position(space.node_parameters())
+        extent = float(np.hypot(np.ptp(R), np.ptp(Z))) * (0.5 if space.closed else 1.0)
+        self.size = min(float(np.hypot(R, Z - Z.mean()).max()), extent)
         self.rest = space.reference_volume
 
     # --- norms
@@ -108,14 +110,15 @@ class Walker:
                 simplified = solve(x + length * dx, pressure + length * dp, trial)
                 if simplified is not None:
                     new = self._relative(x, simplified[0], pressure, simplified[1])
-                    if new <= (1 - length / 2) * size or size < 1e-9:
+                    if new <= (1 - length / 2) * size or size < 1e-6:
                         break
                 length /= 2
             x, pressure = x + length * dx, pressure + length * dp
             evaluation = self.evaluate(x, pressure, factor)
             if not np.isfinite(evaluation.gradient).all():
                 return None
-            if size < 1e-9 and length == 1:
+            # at the floor of round-off, which is high where stiffnesses differ by many orders, corrections shrink no more
+            if length == 1 and (size < 1e-9 or (previous < 1e-6 and 0.2 * previous < size < 1e-6)):
                 return Spot(x, float(pressure), factor, evaluation)
             previous = size
         return None
@@ -171,7 +174,8 @@ class Walker:
 
     def at_height(self, height: float) -> Any:
         row = np.zeros(self.n)
-        row[self.space.pole] = 1.0
+        if self.space.pole < self.n:
+            row[self.space.pole] = 1.0
         return lambda x, p, e: (self.space.center_height(x) - height, row, 0.0)
 
     def at_gas(self, amount: float, chamber: float, atmosphere: float) -> Any:

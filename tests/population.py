@@ -1,19 +1,19 @@
 """A population of random scenes, each with a state that certainly exists: what the search for a first state is measured by.
 
-Everything about a member follows from its seed. Its scene is plain data, the tables of a scene file; how strong its sources and loads are, and
-which load is asked for, follows from a walk (:mod:`.walker`) along a path of small steps from a state that certainly exists. What the walk
-found is recorded in data/population.json, so that asking need not walk again. ::
+Everything about a member follows from its seed: its scene (:mod:`.random_scenes`), and by a walk along small steps from a state that
+certainly exists (:mod:`.walker`) how strong its sources and loads are and which load is asked for. What the walks found is recorded in
+data/population.json, so that asking need not walk again. ::
 
-    python -m tests.population ask --first 0 --count 200        # ask, print what was not answered, and the table
-    python -m tests.population record --first 0 --count 1000    # walk, and write the record
+    python -m tests.population ask --count 200       # ask, write what was not answered as code that asks again, and the table
+    python -m tests.population record --count 1000   # walk, and write the record of so many members
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
-import random
 import re
 import signal
 import sys
@@ -30,6 +30,7 @@ import numpy as np
 
 import femmembrane as fm
 from femmembrane.potential import Potential
+from tests.random_scenes import Draft, draft, scaled_loads
 from tests.walker import Spot, Walker
 
 RECORD = Path(__file__).parent / "data" / "population.json"
@@ -37,324 +38,14 @@ RECORD = Path(__file__).parent / "data" / "population.json"
 RESOLVED = 1e-3
 #: an answer that moves by more than this on a finer mesh is none
 UNRESOLVED = 3e-2
+#: largest pressure times size of a state that is asked for, and largest volume over the cube of the size
+HIGHEST, LARGEST = 2e3, 1e4
 #: seconds after which a question counts as not answered
 PATIENCE = 60
 #: what a message may not claim of a state that exists
 CLAIMS = re.compile(
     r"no tension holds|there is no equilibrium|no equilibrium exists|turned back|no stable state (exists|was met beyond)|nothing holds"
 )
-
-
-class Dice(random.Random):
-    """Draws that depend on nothing but ``random()``, whose sequence is the same in every version of Python."""
-
-    def between(self, low: float, high: float) -> float:
-        return low + (high - low) * self.random()
-
-    def log(self, low: float, high: float) -> float:
-        return float(f"{math.exp(self.between(math.log(low), math.log(high))):.6g}")
-
-    def number(self, low: float, high: float) -> float:
-        return float(f"{self.between(low, high):.6g}")
-
-    def whole(self, low: int, high: int) -> int:
-        return low + int((high - low + 1) * self.random())
-
-    def one_of(self, values: Sequence[Any]) -> Any:
-        return values[int(len(values) * self.random())]
-
-    def chance(self, share: float) -> bool:
-        return self.random() < share
-
-
-# --- scenes -------------------------------------------------------------------------------------------------------------------------
-
-
-@dataclass
-class Draft:
-    """A scene before the walk: tables of a scene file, its family, and what the walk is to do."""
-
-    seed: int
-    family: str
-    tables: dict[str, Any]
-    unit: float
-    direction: int
-    task: str
-    share: float
-    steps: int
-    everted: bool
-    gas: tuple[float, float]
-
-    def scene(self, factor: float = 1.0) -> fm.Scene:
-        """The scene with sources and loads at a part of their strength."""
-        return fm.Scene.from_dict(scaled_loads(self.tables, factor))
-
-
-def scaled_loads(tables: dict[str, Any], factor: float) -> dict[str, Any]:
-    changed = json.loads(json.dumps(tables))
-    for item in (*changed.get("source", ()), *changed.get("load", ())):
-        for name in ("strength", "gamma", "weight", "force"):
-            if name in item:
-                item[name] *= factor
-    return changed
-
-
-def draft(seed: int) -> Draft:
-    """The scene of a seed, and what is to be asked of it; InputError never."""
-    dice = Dice(seed)
-    family = _family(dice)
-    mesh, unit = _MESHES[family](dice)
-    tables: dict[str, Any] = {"material": _material(dice), "mesh": mesh}
-    if dice.chance(0.15):
-        tables["effects"] = {"tension_field": True}
-    bare = fm.Scene.from_dict(tables)
-    tables |= _loads(dice, bare, unit) if dice.chance(0.35) else {}
-    if dice.chance(0.35):
-        tables |= _sources(dice, bare, unit)
-    surrounded = "load" in tables or "source" in tables
-    task = "branch"
-    if dice.chance(0.12):
-        task = dice.one_of(["zero pressure", "zero volume"]) if surrounded else "faint"
-    everted = dice.chance(0.25) and not surrounded
-    return Draft(
-        seed=seed,
-        family=family,
-        tables=tables,
-        unit=unit,
-        direction=1 if dice.chance(0.8) else -1,
-        task=task,
-        share=dice.random(),
-        steps=int(dice.log(2, 80)),
-        everted=everted,
-        gas=(dice.log(0.2, 5), dice.log(0.1, 3)),
-    )
-
-
-_FAMILIES = {
-    "disc": 12,
-    "annulus": 10,
-    "cap": 12,
-    "round cap": 4,
-    "sphere": 6,
-    "tube": 18,
-    "torus": 9,
-    "spheroid": 9,
-    "curve": 12,
-    "other unit": 12,
-}
-
-
-def _family(dice: Dice) -> str:
-    place = dice.random() * sum(_FAMILIES.values())
-    for name, share in _FAMILIES.items():
-        place -= share
-        if place < 0:
-            return name
-    return "disc"
-
-
-def _elements(dice: Dice, low: int = 8, high: int = 40) -> dict[str, Any]:
-    degree = dice.one_of([2, 2, 2, 3, 4])
-    return {"elements": max(low // 2 if degree > 2 else low, int(dice.log(low, high) * 2 / degree)), "degree": degree}
-
-
-def _disc(dice: Dice) -> tuple[dict[str, Any], float]:
-    return {"shape": "disc", **_elements(dice, 12, 64), "ratio": dice.one_of([1.0, 1.0, dice.log(0.3, 3)])}, 1.0
-
-
-def _annulus(dice: Dice) -> tuple[dict[str, Any], float]:
-    ends = dice.one_of(
-        [
-            ("hub", "clamped"),
-            ("hub", "clamped"),
-            ("clamped", "clamped"),
-            ("hub", "radial"),
-            ("free", "clamped"),
-            ("axial", "clamped"),
-            ("clamped", "hub"),
-            ("radial", "clamped"),
-        ]
-    )
-    return {"shape": "annulus", "inner_radius": dice.number(0.08, 0.85), **_elements(dice), "inner": ends[0], "outer": ends[1]}, 1.0
-
-
-def _cap(dice: Dice) -> tuple[dict[str, Any], float]:
-    height = dice.one_of([0.0, dice.log(0.01, 3), dice.log(0.1, 2), dice.log(0.1, 2)])
-    rim = dice.one_of(["clamped", "clamped", "radial", "mirror", "axial", "hub"])
-    return {"shape": "cap", "height": height * (-1 if dice.chance(0.3) else 1), **_elements(dice, 12, 48), "rim": rim}, 1.0
-
-
-def _round_cap(dice: Dice) -> tuple[dict[str, Any], float]:
-    height = dice.log(5, 60) * (-1 if dice.chance(0.3) else 1)
-    # the rim is small beside the sphere: elements become small towards it
-    return {"shape": "cap", "height": height, "elements": dice.whole(24, 48), "degree": 3, "ratio": dice.number(0.02, 0.1)}, 1.0
-
-
-def _sphere(dice: Dice) -> tuple[dict[str, Any], float]:
-    return {"shape": "sphere", **_elements(dice, 8, 32)}, 1.0
-
-
-def _tube(dice: Dice) -> tuple[dict[str, Any], float]:
-    length = dice.log(0.3, 25)
-    words = ["clamped", "clamped", "hub", "hub", "mirror", "radial", "axial", "free"]
-    top, bottom = dice.one_of(words), dice.one_of(words)
-    if top == bottom == "axial":  # two walls and nothing that holds the tube along the axis: a tube of its first length
-        bottom = "clamped"
-    size = _elements(dice, 12, 40)
-    size["elements"] = max(size["elements"], int(2 * length))
-    return {"shape": "cylinder", "length": length, **size, "top": top, "bottom": bottom}, 1.0
-
-
-def _torus(dice: Dice) -> tuple[dict[str, Any], float]:
-    aspect = dice.one_of([1 + dice.log(1e-4, 0.1), 1 + dice.log(0.1, 10), 1 + dice.log(0.1, 10), dice.log(10, 1e4)])
-    return {"shape": "torus", "aspect": float(f"{aspect:.8g}"), **_elements(dice, 12, 32)}, 1.0
-
-
-def _points(cells: int, curved: bool, curve: Any, unit: float, closed: bool = False) -> dict[str, Any]:
-    """Points on a curve, a function of t from 0 to 1; of curved cells with one inside."""
-    t = np.linspace(0, 1, (2 if curved else 1) * cells + 1)
-    points = [[float(f"{unit * r:.12g}"), float(f"{unit * z:.12g}")] for r, z in (curve(float(v)) for v in t)]
-    if closed:
-        points[-1] = list(points[0])
-    return {"shape": "curve", "points": points, "curved": curved}
-
-
-def _spheroid_curve(slenderness: float) -> Any:
-    # exactly 0 at both poles
-    return lambda t: (math.sin(math.pi * min(t, 1 - t)), slenderness * math.cos(math.pi * t))
-
-
-def _spheroid(dice: Dice) -> tuple[dict[str, Any], float]:
-    unit = dice.one_of([1.0, dice.log(0.1, 20)])
-    cells, curved = dice.whole(10, 24), dice.chance(0.7)
-    mesh = _points(cells, curved, _spheroid_curve(dice.log(0.3, 4)), unit)
-    return mesh | {"degree": dice.one_of([2, 2, 3]), "divisions": 1 if cells > 14 else 2}, unit
-
-
-def _curve(dice: Dice, unit: float = 1.0) -> tuple[dict[str, Any], float]:
-    """Cones, barrels, bowls, closed rings and domes, some upside down."""
-    kind = dice.one_of(["cone", "barrel", "waist", "bowl", "ring", "dome", "drop"])
-    flip = -1 if dice.chance(0.4) else 1
-    a, b = dice.number(0.3, 2), dice.number(0.2, 0.9)
-    shapes = {
-        "cone": lambda t: (b + (1 - b) * t, flip * a * (1 - t)),
-        "barrel": lambda t: (1 + b / 2 * math.sin(math.pi * t), flip * a * (0.5 - t)),
-        "waist": lambda t: (1 - b / 2 * math.sin(math.pi * t), flip * a * (0.5 - t)),
-        "bowl": lambda t: (math.sin(math.pi / 2 * t), -a * math.cos(math.pi / 2 * t) if t < 1 else 0.0),
-        "dome": lambda t: (t, flip * a * (1 - t**2)),
-        "ring": lambda t: (1.5 + a + math.sin(2 * math.pi * t), flip * a * math.cos(2 * math.pi * t)),
-        "drop": lambda t: (math.sin(math.pi * min(t, 1 - t)) * (1 + b / 2 * (2 * t - 1)), flip * a * math.cos(math.pi * t)),
-    }
-    mesh = _points(dice.whole(12, 28), dice.chance(0.7), shapes[kind], unit, closed=kind == "ring")
-    words = {"cone": ("clamped", "hub"), "barrel": ("clamped", "hub"), "waist": ("clamped", "hub")}.get(kind, ("clamped",))
-    mesh |= {"degree": dice.one_of([2, 2, 3]), "first": dice.one_of(words), "last": "clamped"}
-    if kind in ("dome", "bowl") and dice.chance(0.3):
-        mesh["last"] = "radial"
-    return mesh, unit
-
-
-def _other_unit(dice: Dice) -> tuple[dict[str, Any], float]:
-    unit = dice.one_of([1e-3, 0.01, 25.0, 1e3, dice.log(1e-3, 1e3)])
-    if dice.chance(0.5):
-        return _curve(dice, unit)
-    kind = dice.one_of(["sphere", "disc", "tube", "torus"])
-    length, aspect = dice.log(1, 6), 1 + dice.log(0.2, 3)
-    shapes = {
-        "sphere": _spheroid_curve(1.0),
-        "disc": lambda t: (t, 0.0),
-        "tube": lambda t: (1.0, length * (0.5 - t)),
-        "torus": lambda t: (aspect + math.sin(2 * math.pi * t), math.cos(2 * math.pi * t)),
-    }
-    mesh = _points(dice.whole(14, 28), True, shapes[kind], unit, closed=kind == "torus")
-    ends = dice.one_of([("clamped", "clamped"), ("hub", "clamped"), ("radial", "radial")]) if kind == "tube" else ("clamped", "clamped")
-    return mesh | {"degree": 2, "first": ends[0], "last": ends[1]}, unit
-
-
-_MESHES = {
-    "disc": _disc,
-    "annulus": _annulus,
-    "cap": _cap,
-    "round cap": _round_cap,
-    "sphere": _sphere,
-    "tube": _tube,
-    "torus": _torus,
-    "spheroid": _spheroid,
-    "curve": _curve,
-    "other unit": _other_unit,
-}
-
-
-def _material(dice: Dice) -> dict[str, Any]:
-    return dice.one_of(
-        [
-            {"model": "neo-hookean"},
-            {"model": "mooney-rivlin", "ratio": dice.log(0.02, 1)},
-            {"model": "mooney-rivlin", "ratio": dice.log(0.02, 1)},
-            {"model": "ogden", "mu": [1.4910, 0.0029, -0.0236], "alpha": [1.3, 5.0, -2.0]},
-            {"model": "ogden", "mu": list(fm.Ogden.treloar().mu), "alpha": list(fm.Ogden.treloar().alpha)},
-            {"model": "varga"},
-            {"model": "yeoh", "c2": dice.log(0.003, 0.3), "c3": dice.one_of([0.0, dice.log(1e-4, 0.01)])},
-            {"model": "gent", "jm": dice.log(1, 100)},
-            {"model": "arruda-boyce", "links": dice.log(3, 50)},
-            {"model": "fung", "b": dice.log(0.01, 0.5)},
-        ]
-    )
-
-
-def _loads(dice: Dice, bare: fm.Scene, unit: float) -> dict[str, Any]:
-    """A weight, a liquid, a force on a hub, as the scene can take them; E = w Int eta R dS, so that w is over a length."""
-    sign = 1 if dice.chance(0.75) else -1
-    weight = {"kind": "weight", "weight": sign * dice.log(1e-3, 0.3) / unit}
-    liquid = {"kind": "hydrostatic", "gamma": sign * dice.log(0.01, 1) / unit**2}
-    force = {"kind": "hub-force", "force": sign * dice.log(0.02, 3) * unit}
-    if dice.chance(0.5):
-        force["hub"] = dice.one_of(["first", "last"])
-    if Potential(bare).space.pin is not None:  # nothing holds it along the axis: two hubs may be pulled apart, and nothing else
-        pair = [force | {"hub": "first"}, force | {"hub": "last", "force": -force["force"]}]
-        return {"load": pair} if [end.rigid for end in Potential(bare).space.supports] == [True, True] else {}
-    for choice in sorted([[weight], [liquid], [force], [liquid, weight]], key=lambda _: dice.random()):
-        tables = bare.to_dict() | {"load": choice}
-        try:
-            Potential(fm.Scene.from_dict(tables))
-        except fm.InputError:
-            continue
-        return {"load": choice}
-    return {}
-
-
-def _sources(dice: Dice, bare: fm.Scene, unit: float) -> dict[str, Any]:
-    """One or two sources off the membrane; their energy density is at most a part of the modulus on the membrane at rest."""
-    s = np.linspace(*bare.mesh.breakpoints()[[0, -1]], 200)
-    R, Z = bare.mesh.position(s)
-    size, high, low = float(R.max()), float(Z.max()), float(Z.min())
-    floats = Potential(bare).space.pin is not None
-    above = high + size * dice.log(0.6, 4)
-    below = low - size * dice.log(0.6, 4)
-    at = float(f"{dice.one_of([above, below]):.6g}")
-    middle = float(f"{(high + low) / 2:.6g}")
-    dipole = {"kind": "dipole", "height": at}
-    loop = {"kind": "loop", "height": at, "radius": float(f"{size * dice.log(0.3, 2):.6g}")}
-    around = {"kind": "loop", "height": middle, "radius": float(f"{size * dice.log(1.5, 3):.6g}")}
-    coil = {"kind": "solenoid", "height": at, "radius": loop["radius"], "length": float(f"{size * dice.log(0.1, 0.8):.6g}")}
-    wire, uniform = {"kind": "wire"}, {"kind": "uniform"}
-    choices = [[dipole], [dipole], [loop], [coil], [dipole, uniform], [around]]
-    if R.min() > 0.05 * size:
-        choices += [[wire], [wire], [wire]]
-    if floats:
-        choices = [[wire]] if R.min() > 0.05 * size else []
-    if not choices:
-        return {}
-    chosen = [dict(source) for source in dice.one_of(choices)]
-    chi, energy = dice.log(0.1, 3), dice.log(0.02, 1.5)
-    scene = {"membrane": {"susceptibility": chi}}
-    for source in chosen:
-        unit_source = {"dipole": fm.Dipole, "loop": fm.Loop, "solenoid": fm.Solenoid, "wire": fm.Wire, "uniform": fm.Uniform}[
-            source["kind"]
-        ](strength=1.0, **{k: v for k, v in source.items() if k != "kind"})
-        most = float(np.max(unit_source.intensity(R, Z)))
-        source["strength"] = float(f"{2 * energy / (chi * most * len(chosen)):.6g}")
-    return scene | {"source": chosen}
-
 
 # --- the walk -----------------------------------------------------------------------------------------------------------------------
 
@@ -526,9 +217,11 @@ def _tour(plan: Draft, walker: Walker, start: Spot) -> Iterator[Spot]:
         direction = -direction
     yield start
     quantity = {"zero pressure": "pressure", "zero volume": "volume"}.get(plan.task)
-    before, largest = start, 1e4 * walker.size**3
+    before = start
     for spot in walker.branch(start, direction, 80 if quantity else plan.steps):
-        if not walker.clear(spot) or abs(spot.volume) > largest or not walker.taut(spot):
+        if not (walker.clear(spot) and walker.taut(spot)):
+            return
+        if abs(spot.volume) > LARGEST * max(walker.size**3, abs(walker.rest)) or abs(spot.pressure) * walker.size > HIGHEST:
             return
         if quantity and getattr(before, quantity) * getattr(spot, quantity) < 0:
             control = walker.at_pressure(0.0) if quantity == "pressure" else walker.at_volume(0.0)
@@ -747,21 +440,22 @@ class Report:
     answers: list[Answer] = field(default_factory=list)
 
     def table(self) -> str:
-        lines = [
-            f"{'family':<14}{'scenes':>7}{'asked':>7}{'answered':>9}{'refused':>8}{'wrong':>7}{'crashed':>8}{'its':>6}{'its 95%':>8}{'ms':>7}{'ms 95%':>8}"
-        ]
+        """By families: scenes, questions, how they were answered, iterations and milliseconds (median and 95 of 100) of those answered."""
+        titles = ("family", "scenes", "asked", "answered", "refused", "wrong", "crashed", "its", "95%", "ms", "95%")
         groups: dict[str, list[Answer]] = defaultdict(list)
         for answer in self.answers:
             groups[answer.member.family].append(answer)
-        for name, group in [*groups.items(), ("all", self.answers)]:
-            kinds = Counter(a.verdict.split(":")[0] for a in group)
-            its, ms = ([getattr(a, key) for a in group if a.good] or [0] for key in ("iterations", "seconds"))
-            crashed = kinds["crashed"] + kinds["warned"] + kinds["late"]
-            lines.append(
-                f"{name:<14}{len({a.member.seed for a in group}):>7}{len(group):>7}{kinds['answered']:>9}{kinds['refused']:>8}{kinds['wrong']:>7}"
-                f"{crashed:>8}{np.median(its):>6.0f}{np.percentile(its, 95):>8.0f}{1e3 * np.median(ms):>7.0f}{1e3 * np.percentile(ms, 95):>8.0f}"
-            )
-        return "\n".join(lines)
+        rows = [titles, *(self._row(name, group) for name, group in [*sorted(groups.items()), ("all", self.answers)])]
+        return "\n".join(f"{row[0]:<12}" + "".join(f"{cell:>10}" for cell in row[1:]) for row in rows)
+
+    def _row(self, name: str, group: Sequence[Answer]) -> tuple[Any, ...]:
+        kinds = Counter(a.verdict.split(":")[0] for a in group)
+        crashed = kinds["crashed"] + kinds["warned"] + kinds["late"]
+        counts = (len({a.member.seed for a in group}), len(group), kinds["answered"], kinds["refused"], kinds["wrong"], crashed)
+        work: list[float] = []
+        for values in ([a.iterations for a in group if a.good], [1e3 * a.seconds for a in group if a.good]):
+            work += [round(float(np.percentile(values or [0], share))) for share in (50, 95)]
+        return name, *counts, *work
 
     @property
     def share(self) -> float:
@@ -769,50 +463,57 @@ class Report:
         return sum(a.good for a in self.answers) / max(len(self.answers), 1)
 
     @property
-    def whole(self) -> float:
-        """Of the scenes, those of which every question was answered."""
+    def wrong(self) -> list[Answer]:
+        """Answers that are none, and refusals that claim what is not so."""
+        return [a for a in self.answers if a.verdict.startswith("wrong")]
+
+    def __str__(self) -> str:
         failed = {a.member.seed for a in self.answers if not a.good}
-        return 1 - len(failed) / max(len({a.member.seed for a in self.answers}), 1)
+        scenes = len({a.member.seed for a in self.answers})
+        others = sum(a.other for a in self.answers if a.good)
+        return (
+            f"{self.table()}\n{self.share:.2%} of the questions were answered ({others} by another equilibrium than that of the walk); "
+            f"{scenes - len(failed)} of {scenes} scenes had every answer"
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Walk or ask from the command line."""
     parser = argparse.ArgumentParser(prog="python -m tests.population")
-    parser.add_argument("what", choices=["ask", "record", "walk"])
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--out", type=Path, default=None, help="record: where to write; ask: a JSON file of what failed")
+    parser.add_argument("what", choices=["ask", "record"])
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--count", type=int, default=100, help="how many members (record) or seeds (ask)")
+    parser.add_argument("--out", type=Path, default=RECORD, help="record: where to write")
     asked = parser.parse_args(arguments)
-    seeds = range(asked.first, asked.first + asked.count)
-    report, members, lost = Report(), [], Counter()
-    for seed in seeds:
+    if asked.what == "record":
+        _record_all(asked.first, asked.count, asked.out)
+        return 0
+    report = Report()
+    for one in [recorded()[seed] for seed in range(asked.first, asked.first + asked.count) if seed in recorded()]:
+        answers = ask(one)
+        report.answers += answers
+        for a in answers:
+            if not a.good:
+                sys.stdout.write(f"# seed {one.seed} ({one.family}) {a.verdict}: {a.text}\n{a.snippet()}\n\n")
+                sys.stdout.flush()
+    sys.stdout.write(f"{report}\n")
+    return 0
+
+
+def _record_all(first: int, count: int, path: Path) -> None:
+    members, lost = [], Counter[tuple[str, str]]()
+    for seed in itertools.count(first):
+        if len(members) == count:
+            break
         try:
-            if asked.what == "ask":
-                if RECORD.exists() and seed not in recorded():
-                    continue
-                one = member(seed)
-            else:
-                one = walk(seed)
+            members.append(walk(seed))
         except NoTruthError as reason:
             lost[draft(seed).family, str(reason)] += 1
-            print(f"seed {seed}: no truth, {reason} ({draft(seed).family})", file=sys.stderr)
-            continue
-        members.append(one)
-        if asked.what == "walk":
-            print(one)
-        if asked.what == "ask":
-            answers = ask(one)
-            report.answers += answers
-            for answer in answers:
-                if not answer.good:
-                    print(f"# seed {seed} ({one.family}) {answer.verdict}: {answer.text}\n{answer.snippet()}\n", flush=True)
-    if asked.what == "record":
-        record(members, asked.out or RECORD)
-    if asked.what == "ask":
-        print(report.table())
-        print(f"questions answered {report.share:.2%}, scenes answered in everything {report.whole:.2%}")
+            sys.stderr.write(f"seed {seed} ({draft(seed).family}): {reason}\n")
+    record(members, path)
     for (family, reason), count in sorted(lost.items()):
-        print(f"no truth: {family}: {reason}: {count}", file=sys.stderr)
-    return 0
+        sys.stderr.write(f"no state to ask for: {family}: {reason}: {count}\n")
+    sys.stderr.write(f"{len(members)} members\n")
 
 
 if __name__ == "__main__":

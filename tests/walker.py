@@ -1,8 +1,8 @@
 """An independent way to a state that certainly exists: Newton's method on dense matrices, along paths of small steps.
 
-Nothing here uses the solvers of the package: of it only the potential is taken (values, gradients and the Hessian of E and V). A walk begins
-where a state certainly exists, at the shape that an elastic foundation holds in place; the foundation is taken away at constant volume, then
-sources and loads are turned on, and the branch is followed by arc length. It is as slow as it likes to be.
+Nothing here uses the solvers of the package: of it only the potential is taken (values, gradients and the Hessian of E and V). A walk
+begins where a state certainly exists, at the shape that an elastic foundation holds in place; the foundation is taken away at constant
+volume, then sources and loads are turned on, and the branch is followed by arc length. It is as slow as it likes to be.
 """
 
 from __future__ import annotations

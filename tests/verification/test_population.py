@@ -50,7 +50,7 @@ def test_a_walk_finds_what_is_recorded(member):
 
 def test_a_population_has_all_kinds():
     """All shapes, supports, loads, sources and materials occur, zeros and images too."""
-    drafts = [member.draft for member in MEMBERS]
+    drafts = [member.draft for member in MEMBERS[::4]]
     tables = [plan.tables for plan in drafts]
     assert {t["mesh"]["shape"] for t in tables} == {"disc", "annulus", "cap", "sphere", "cylinder", "torus", "curve"}
     ends = {t["mesh"].get(key) for t in tables for key in ("inner", "outer", "rim", "top", "bottom", "first", "last")}

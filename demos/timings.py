@@ -23,8 +23,8 @@ import femmembrane as fm
 from femmembrane.native import in_numpy, native
 from femmembrane.potential import Potential
 from femmembrane.solve.controls import VolumeControl
-from femmembrane.solve.newton import NewtonResult, correct
 from femmembrane.solve.guess import spherical_dome
+from femmembrane.solve.newton import NewtonResult, correct
 from femmembrane.stability.zones import find_zones
 
 OGDEN = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))

@@ -16,12 +16,7 @@ def guess_at_volume(potential: Potential, volume: float) -> Array:
     """Coefficients of a smooth shape that respects the supports and encloses a volume."""
     if isinstance(potential.space.mesh, Disc):
         return spherical_dome(potential, volume)
-    share = volume / potential.space.reference_volume if potential.space.reference_volume else 0.0
-    if not potential.space.edges and share > 0:  # the shape itself in another size, which crosses the axis nowhere
-        s = potential.space.interpolation_points()
-        R, Z = potential.space.mesh.position(s)
-        return (share ** (1 / 3) - 1) * potential.space.interpolate(R, Z)
-    direction = potential.space.unit * _normal(potential.space)
+    direction = _direction(potential.space, volume)
     amplitudes = np.array([-1.0, 0.0, 1.0, 2.0])
     # the volume is a cubic in the amplitude: so through four values exactly
     volumes = np.array([potential.evaluate(a * direction, 0.0).volume for a in amplitudes])
@@ -31,6 +26,13 @@ def guess_at_volume(potential: Potential, volume: float) -> Array:
     roots = np.roots(cubic)
     real = roots[np.abs(roots.imag) < 1e-9 * np.abs(roots)].real
     return float(real[np.argmin(np.abs(real))]) * direction if real.size else direction
+
+
+def _direction(space: Space, volume: float) -> Array:
+    """Displacement along which the shape changes its volume: of one without edges, its own growth, which crosses the axis nowhere."""
+    if not space.edges and volume * space.reference_volume > 0:
+        return space.interpolate(*space.mesh.position(space.interpolation_points()))
+    return space.unit * _normal(space)
 
 
 def _normal(space: Space) -> Array:

@@ -17,7 +17,7 @@ TOLERANCE = 1e-10
 RESIDUAL = 1e-12
 #: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it: one along which
 #: the membrane is so soft, such as a shift of a bulge in a long tube, that round-off decides it
-ROUND_OFF, SOFT = 2e-14, 1e-6
+ROUND_OFF, SOFT = 2e-14, 1e-4
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 #: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
@@ -74,7 +74,7 @@ def correct(
         foretold from two corrections in quadratic convergence and confirmed by the residual at x and its correction by the factors before.
     """
     evaluation = potential.evaluate(x, pressure, magnetic)
-    previous, iteration = np.inf, 0
+    previous, iteration, unbalance = np.inf, 0, np.inf
     while True:
         equations = Equations(potential, control, x, pressure, evaluation)
         if not equations.finite:
@@ -85,6 +85,9 @@ def correct(
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
         stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
+        if stalled and size <= SOFT and not done:
+            before, unbalance = unbalance, equations.residual
+            stalled = unbalance > 1e-2 * before  # along a soft direction corrections are round-off while forces still come into balance
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
@@ -128,13 +131,17 @@ class Equations:
         """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
         if isinstance(self.control, ArcLengthControl):
             return True
-        return bool(abs(self.gap) <= 1e-14 * (abs(self._row @ self.x) + abs(self._corner * self.pressure)))
+        terms = abs(self._row @ self.x) + abs(self._corner * self.pressure)
+        return bool(abs(self.gap) <= 1e-14 * self.potential.space.slenderness * terms)
 
     @property
     def at_round_off(self) -> bool:
         """Whether no correction can be told from round-off: forces balance as far as positions are known, and the control is met."""
-        residual = relative_residual(self.potential, self.force, self.evaluation, self.pressure)
-        return residual <= ROUND_OFF * self.potential.space.slenderness and self.on_control
+        return self.residual <= ROUND_OFF * self.potential.space.slenderness and self.on_control
+
+    @property
+    def residual(self) -> float:
+        return relative_residual(self.potential, self.force, self.evaluation, self.pressure)
 
     def balanced(self, dp: float) -> bool:
         """Whether a correction of P changes no force."""
@@ -159,8 +166,7 @@ class Equations:
         return max(parts) if max(change) < np.inf else np.inf
 
     def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
-        residual = relative_residual(self.potential, self.force, self.evaluation, self.pressure)
-        return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, residual, self.gap, status)
+        return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, self.residual, self.gap, status)
 
     @property
     def _factored(self) -> BorderedFactor | CompiledBorder:

@@ -19,7 +19,7 @@ from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoin
 from ..scene import MAX_STEPS, Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
-from ..solve.newton import correct
+from ..solve.newton import TOLERANCE, correct
 from ..solve.search import Limit, beyond_crossing, beyond_limit, loss_before
 from ..solve.special_points import ON_FOLD
 from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume, start_in_gas
@@ -462,7 +462,8 @@ class _Walk:
         return lambda state: is_minimum(self.potential, control, state.evaluation)
 
     def _turn(self, error: SolveError, load: float) -> _Turn:
-        last = error.result[-1] if error.result else self.state
+        # next to a crossing of branches round-off lies along the other one; the last state that it did not touch has a tangent of its own
+        last = next((s for s in reversed(error.result or []) if s.correction <= TOLERANCE), self.state)
         if self.quantity not in _MINIMISED or last is None:
             return _Turn(Limit(None, None))
         return _Turn(beyond_limit(self.potential, last, self.quantity, load, self._stable(load), any_before=self.corrector is correct))

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
 from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
 
@@ -32,11 +32,9 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
 
     asked = read(scene, changes)
     meshes = {"degrees": _numbers("--degrees", degrees, MAX_DEGREE), "elements": _numbers("--elements", elements)}
-    prepare(out)
-    from ..results.lock import locked
     from ..verbs.convergence import convergence_of_run
 
-    with locked(out), Interrupts() as interrupts:
+    with working(out, ("convergence.csv", "convergence.png")), Interrupts() as interrupts:
         try:
             study = convergence_of_run(asked, **meshes)
         except SolveError as error:

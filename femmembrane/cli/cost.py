@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
 from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
 
@@ -27,12 +27,10 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
         Few meshes, each measured once: seconds in place of minutes.
     """
     asked = read(scene, changes)
-    prepare(out)
-    from ..results.lock import locked
     from ..verbs.cost import QUICK, asked_load
     from ..verbs.cost import cost as measure
 
-    with locked(out), Interrupts() as interrupts:
+    with working(out, ("cost.csv", "cost.png")), Interrupts() as interrupts:
         try:
             study = measure(asked, **asked_load(asked) | (dict(QUICK) if quick else {}))
         except SolveError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,26 +34,15 @@ def report(folder: Path, /, *, out: Path | None = None) -> int:
 
 def write(folder: Path, out: Path | None = None) -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
+    from ..results.output import read_record
     from ..views.report import write_report
 
     inside = folder if folder.is_dir() else folder.parent
-    facts = _facts(inside / "run.json") if folder.is_dir() else {}
+    facts = (read_record(folder) or {}) if folder.is_dir() else {}
     branch = _without_equilibria(facts) if facts.get("equilibria") == 0 else finished(folder)
     page = inside / "report.html" if out is None else out
     write_report(branch, page, facts)
     return page
-
-
-def _facts(file: Path) -> dict[str, Any]:
-    try:
-        facts = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:  # a branch that was saved on its own
-        return {}
-    except (OSError, ValueError) as error:
-        raise InputError("folder", str(file), f"the run.json of a run is needed ({error})") from None
-    if not isinstance(facts, dict):
-        raise InputError("folder", str(file), "the run.json of a run is needed")
-    return facts
 
 
 def _without_equilibria(facts: dict[str, Any]) -> Branch:
@@ -63,6 +51,6 @@ def _without_equilibria(facts: dict[str, Any]) -> Branch:
     from ..scene import Scene
 
     try:
-        return Branch(Scene.from_dict(facts["scene"]), (), Status(facts["status"]), str(facts["message"]), facts["timings"])
-    except (KeyError, ValueError) as error:
+        return Branch(Scene.from_dict(facts["scene"]), (), Status(facts["status"]), facts["message"], facts["timings"])
+    except (KeyError, ValueError, RecursionError) as error:
         raise InputError("folder", "run.json", f"the run.json of a run is needed ({error})") from None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
 from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written
 from .progress import observer
@@ -42,13 +42,10 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         Write report.html as well, one page about the run.
     """
     asked = read(scene, changes)
-    prepare(out)
-    from ..results.checkpoint import Checkpoints, same_scene, unfinished
-    from ..results.lock import locked
-    from ..results.output import clean
+    from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
+    from ..results.files import RUN_FILES, SURFACES_FOLDER
 
-    with locked(out), Interrupts() as interrupts:
-        clean(out)
+    with working(out, (*RUN_FILES, NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
         kept = unfinished(out) if resume else None
         if kept is not None:
             same_scene(asked, kept, "--resume")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
 from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written
 
@@ -79,11 +79,8 @@ def sweep(
     if dry_run:
         sys.stdout.write(f"{plan_sweep(asked, grid, out=out, **what)}\n")
         return DONE
-    prepare(out)
     done = [0, 0]
-    from ..results.lock import locked
-
-    with locked(out), Interrupts() as interrupts, _observer() as progress:
+    with working(out, ("sweep.nc", "sweep.png", "scenes.sqlite")), Interrupts() as interrupts, _observer() as progress:
 
         def on_scene(count: int, total: int, failed: int) -> None:
             done[:] = count, total

@@ -24,6 +24,15 @@ from pathlib import Path
 
 from ..errors import InputError
 
+#: the record of a run, which makes its folder complete, and all files of one, in the order in which they are listed
+RECORD = "run.json"
+RUN_FILES = (
+    *("branch.csv", "special_points.csv", "zones.csv", RECORD),
+    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
+    "report.html",  # written from the rest, by whom it is asked for
+)
+#: the folder of the surfaces of a run
+SURFACES_FOLDER = "membrane"
 #: words that a sealed file has in its attributes, and before the digest at its end
 SEAL = "femmembrane seal, BLAKE2b-256:"
 _DIGITS = 64
@@ -163,7 +172,7 @@ def _unusable(path: Path, reason: str) -> InputError:
 
 
 def refuse_obstacles(folder: Path, names: Iterable[str], folders: Iterable[str] = ()) -> None:
-    """Refuse a folder in which results could not take their places; a link or a pipe with the name of a file is no obstacle, it is replaced.
+    """Refuse a folder in which results could not take their places; a link or a pipe with the name of a file is replaced, and no obstacle.
 
     Raises
     ------

@@ -123,3 +123,20 @@ def load_dataset(path: str | PathLike[str]) -> xarray.Dataset:
     if not (len(shape) == len(keys) > 0 and words and whole):
         raise InputError("path", str(path), f"{what} is needed")
     return dataset
+
+
+def _stacked(values: Sequence[Any]) -> Any:
+    """Series of different lengths, filled up with NaN, shape (scenes, longest)."""
+    series = [np.zeros(0) if v is None else np.atleast_1d(v) for v in values]
+    data = np.full((len(series), max(s.size for s in series)), np.nan)
+    for place, s in enumerate(series):
+        data[place, : s.size] = s
+    return data
+
+
+def _text(values: Sequence[str | None]) -> Any:
+    return np.array([v or "" for v in values], dtype=object)
+
+
+def _labels(values: tuple[Any, ...]) -> Any:
+    return np.array(values, dtype=object) if isinstance(values[0], str) else np.array(values)

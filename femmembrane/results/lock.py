@@ -50,7 +50,9 @@ def _hold(path: Path) -> int:
             os.lseek(descriptor, 0, os.SEEK_SET)
             text = os.read(descriptor, 200).strip(b"\0")  # which is what a file may hold after the power failed
             if text and not text.startswith(_HOLDER):
-                raise InputError("--out", str(path.parent), f"{path.name} in it belongs to something else; remove it, or choose another folder")
+                raise InputError(
+                    "--out", str(path.parent), f"{path.name} in it belongs to something else; remove it, or choose another folder"
+                )
             if free is False:
                 holder = text.decode("utf-8", "replace").strip() or "another process"
                 raise InputError("--out", str(path.parent), f"{holder} is writing to it; a folder of its own is allowed")

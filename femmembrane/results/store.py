@@ -404,7 +404,9 @@ def read_dataset(path: str | PathLike[str], what: str) -> xarray.Dataset:
         content, _ = files.unsealed(files.read_bytes(path))
         _refuse_elsewhere(content)
         # the values as they stand: no times, masks or scales are in our files
-        return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False, mask_and_scale=False)
+        dataset = xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False, mask_and_scale=False)
+        dataset.attrs.pop("seal", None)
+        return dataset
     except Exception as error:  # there is nothing that libraries do not raise when they meet bytes that nobody wrote
         raise InputError("path", str(path), f"{what} is needed ({reason(error)})") from error
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,7 +54,10 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
             return ended
         checkpoints = Checkpoints(out, kept)
         interrupts.hold = True  # until the next equilibrium: raised inside a compiled solver it is swallowed, with a warning from there
+        for remark in checkpoints.remarks:
+            fail(DONE, remark)
         branch, code, message = _compute(asked, interrupts, checkpoints)
+        branch = replace(branch, remarks=checkpoints.remarks) if checkpoints.remarks else branch
         if code == INTERRUPTED and not len(branch):  # whatever an earlier run left in the folder is worth more
             raise KeyboardInterrupt
         try:

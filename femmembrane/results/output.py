@@ -17,14 +17,12 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError, NotWrittenError, Status
 from ..native import native
 from .files import RECORD, RUN_FILES, SURFACES_FOLDER, read_bytes, refuse_obstacles
+from .origin import NOTED_VERSIONS
 from .store import package_version, reason, replace_file, save
 from .table import write_csv, write_special_points_csv, write_zones_csv
 
 if TYPE_CHECKING:
     from .records import Branch
-
-#: distributions whose versions are noted in run.json
-NOTED_VERSIONS = ("femmembrane", "numpy", "scipy", "scikit-fem", "casadi")
 
 
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:

@@ -313,6 +313,26 @@ class Jump:
     landing: Equilibrium
 
 
+class SoFar(Sequence[Equilibrium]):
+    """The equilibria that a growing list has now: taken after each step of a run, a copy would cost a time quadratic in the steps."""
+
+    def __init__(self, growing: list[Equilibrium]) -> None:
+        self._growing, self._count = growing, len(growing)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Equilibrium: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Equilibrium, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Equilibrium | tuple[Equilibrium, ...]:
+        places = range(self._count)[index]
+        return self._growing[places] if isinstance(places, int) else tuple(self._growing[k] for k in places)
+
+
 @dataclass(frozen=True, eq=False)
 class Branch(Sequence[Equilibrium]):
     """Equilibria in the order in which they were found.
@@ -320,7 +340,7 @@ class Branch(Sequence[Equilibrium]):
     Attributes
     ----------
     scene : Scene
-    equilibria : tuple of Equilibrium
+    equilibria : sequence of Equilibrium
     status : Status
         How the run ended; with a ``message`` unless all went well.
     timings : mapping of str to float
@@ -331,10 +351,12 @@ class Branch(Sequence[Equilibrium]):
         Where a run snapped because the branch turned back before a load.
     solver : str
         Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
+    remarks : tuple of str
+        What is to be known of how the run went on, such as that another processor began it.
     """
 
     scene: Scene
-    equilibria: tuple[Equilibrium, ...]
+    equilibria: Sequence[Equilibrium]
     status: Status = Status.CONVERGED
     message: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
@@ -342,6 +364,7 @@ class Branch(Sequence[Equilibrium]):
     memory: PathMemory | None = field(default=None, repr=False)
     jumps: tuple[Jump, ...] = ()
     solver: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -423,10 +446,10 @@ class Branch(Sequence[Equilibrium]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was done about motions of the membrane as a whole that nothing resists; nothing for one that is held."""
+        """The remarks, and what was done about motions of the membrane as a whole that nothing resists."""
         from ..discretization.space import space_of_scene
 
-        return () if self.scene.open else space_of_scene(self.scene).notes
+        return self.remarks if self.scene.open else (*self.remarks, *space_of_scene(self.scene).notes)
 
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""

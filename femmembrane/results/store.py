@@ -167,9 +167,9 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
 
 
-def save(branch: Branch, path: str | PathLike[str]) -> None:
-    """Write a branch to a NetCDF file, from which :func:`load` brings it back to the last bit."""
-    dataset = to_xarray(branch)
+def save(branch: Branch, path: str | PathLike[str], facts: Mapping[str, str] | None = None) -> None:
+    """Write a branch to a NetCDF file, from which :func:`load` brings it back to the last bit; ``facts`` are further attributes of it."""
+    dataset = to_xarray(branch).assign_attrs(facts or {})
     encoding = {
         str(name): {"_FillValue": None, **({"zlib": True, "complevel": 1, "shuffle": True} if variable.ndim == 2 and variable.size else {})}
         for name, variable in dataset.variables.items()
@@ -373,6 +373,7 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "status": branch.status.value,
         "message": branch.message,
         **({"solver": branch.solver} if branch.solver else {}),
+        **({"remarks": json.dumps(branch.remarks)} if branch.remarks else {}),
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
         **_trace_attributes(branch.memory),
@@ -480,7 +481,9 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
         timings={str(stage): float(seconds) for stage, seconds in json.loads(dataset.attrs["timings"]).items()},
         memory=_memory(dataset),
         jumps=_jumps(dataset, scene, equilibria),
-        solver=str(dataset.attrs.get("solver", "")),  # younger than the format
+        # younger than the format
+        solver=str(dataset.attrs.get("solver", "")),
+        remarks=tuple(map(str, json.loads(dataset.attrs.get("remarks", "[]")))),
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
+from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, say
 
 
 def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
@@ -50,7 +50,7 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
     if study.messages:
         return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
     if sys.stdout.isatty():
-        sys.stdout.write("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
+        say("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
     return DONE
 
 

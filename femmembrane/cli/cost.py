@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written
+from .outcome import DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, say
 
 
 def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False) -> int:
@@ -43,5 +43,5 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN, not_written(error, out))
     if sys.stdout.isatty():
-        sys.stdout.write(f"{study}\n")
+        say(f"{study}\n")
     return DONE

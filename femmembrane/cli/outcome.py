@@ -4,16 +4,34 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TextIO
 
-from ..errors import InputError, Status
+from ..errors import InputError, Status, printable
 
 DONE, BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, INTERRUPTED = 0, 2, 3, 4, 130
 
 
+#: characters that a message has at most: the middle of a longer one is left out
+_LONGEST = 900
+
+
 def fail(code: int, message: str) -> int:
     line = " ".join(message.split())
-    sys.stderr.write(f"femmembrane: {line}\n")
+    if len(line) > _LONGEST:
+        line = f"{line[: _LONGEST * 3 // 4]} ... {line[-_LONGEST // 4 :]}"
+    _write(sys.stderr, f"femmembrane: {line}\n")
     return code
+
+
+def say(text: str) -> None:
+    """Write to standard output."""
+    _write(sys.stdout, text)
+
+
+def _write(stream: TextIO, text: str) -> None:
+    """The one way in which text that may come from files and options goes to a terminal."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    stream.write(printable(text).encode(encoding, "backslashreplace").decode(encoding))
 
 
 def explain(status: Status, message: str) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Status
 from .folders import finished
-from .outcome import DONE
+from .outcome import DONE, say
 
 if TYPE_CHECKING:
     from ..results.records import Branch
@@ -28,12 +28,13 @@ def report(folder: Path, /, *, out: Path | None = None) -> int:
     """
     page = write(folder, out)
     if sys.stdout.isatty():
-        sys.stdout.write(f"written:\n  {page}\n")
+        say(f"written:\n  {page}\n")
     return DONE
 
 
 def write(folder: Path, out: Path | None = None) -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
+    from ..results.files import remove_leftovers
     from ..results.output import read_record
     from ..views.report import write_report
 
@@ -41,6 +42,7 @@ def write(folder: Path, out: Path | None = None) -> Path:
     facts = (read_record(folder) or {}) if folder.is_dir() else {}
     branch = _without_equilibria(facts) if facts.get("equilibria") == 0 else finished(folder)
     page = inside / "report.html" if out is None else out
+    remove_leftovers(page.parent)
     write_report(branch, page, facts)
     return page
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError, SolveError, Status
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written
+from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, say
 from .progress import observer
 from .report import write as write_report
 
@@ -76,7 +76,7 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
     if sys.stdout.isatty():
-        sys.stdout.write(_summary(branch, written))
+        say(_summary(branch, written))
     return DONE
 
 

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ..errors import InputError
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written
+from .outcome import DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, say
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -77,7 +77,7 @@ def sweep(
         grid[key] = values
     what: dict[str, Any] = {"quantity": quantity, "pressure": pressure, "volume": volume, "direction": direction, "workers": workers}
     if dry_run:
-        sys.stdout.write(f"{plan_sweep(asked, grid, out=out, **what)}\n")
+        say(f"{plan_sweep(asked, grid, out=out, **what)}\n")
         return DONE
     done = [0, 0]
     with working(out, ("sweep.nc", "sweep.png", "scenes.sqlite")), Interrupts() as interrupts, _observer() as progress:
@@ -108,7 +108,7 @@ def sweep(
     if not results:
         return fail(NOT_CONVERGED, f"no scene has a result; the reasons are in {written[0]}")
     if sys.stdout.isatty():
-        sys.stdout.write("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
+        say("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
     return DONE
 
 

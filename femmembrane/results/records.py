@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, Status, unknown_name
+from ..errors import InputError, Status, printable, unknown_name
 from ..threads import one_thread
 
 if TYPE_CHECKING:
@@ -427,7 +427,7 @@ class Branch(Sequence[Equilibrium]):
         zones = self.scene.analysis.wrinkling is not None
         head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {'under ' + c:<14}" for c in classes)
         head += "  zones" if zones else ""
-        lines = [self.scene.title, head] if self.scene.title else [head]
+        lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
             numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
             words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)

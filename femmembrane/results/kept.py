@@ -76,7 +76,7 @@ class Kept:
             found = self._file.execute("SELECT row FROM scene WHERE key = ?", (key,)).fetchone()
             digest, text = found[0].split(" ", 1) if found else ("", "")
             value = json.loads(text) if digest == _digest(key, text) else None
-        except (sqlite3.DatabaseError, AttributeError, ValueError, RecursionError):
+        except (sqlite3.DatabaseError, AttributeError, TypeError, ValueError, RecursionError):
             return None
         return value if isinstance(value, dict) else None
 

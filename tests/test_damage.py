@@ -495,3 +495,21 @@ def test_a_checkpoint_is_taken_without_a_copy(old):
     assert (taken[-1], taken[:], taken[5:]) == (second, (first, second), ())
     with pytest.raises(IndexError):
         taken[2]
+
+
+# --- warnings of NumPy, which are errors here
+
+
+def test_points_without_strains_are_no_matter_for_a_warning(tmp_path):
+    """On the axis lambda_2 = 0, so that e_2 = -inf; beyond it there is none. Where a dipole is, its intensity is no number."""
+    from femmembrane.physics.kinematics import hencky_strains
+
+    e1, e2 = hencky_strains(np.ones(3), 1.0, 0.0, np.array([0.0, -1.0, -2.0]), np.array([0.0, -1.0, 0.0]), 0.0)
+    assert e1.tolist() == [0.0, -np.inf, 0.0]
+    assert e2[:2].tolist() == [0.0, -np.inf]
+    assert np.isnan(e2[2])
+    assert not np.isfinite(fm.Dipole(strength=1.0, height=2.0).intensity(np.zeros(1), np.full(1, 2.0))).any()
+    for text in ("", "\n\n", "rho,z,h_rho,h_z\n"):
+        (tmp_path / "field.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match="no points"):
+            fm.Tabulated.from_csv(tmp_path / "field.csv")

@@ -7,9 +7,13 @@ equilibrium could not be found. Nothing in the library raises a bare exception f
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
+
+#: control characters but for tabs and line ends, separators of lines that are none, and halves of characters
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 class Status(StrEnum):
@@ -77,7 +81,7 @@ class InputError(FemmembraneError, ValueError):
 
     def __init__(self, key: str, value: Any, allowed: str) -> None:
         self.key, self.value, self.allowed = key, value, allowed
-        super().__init__(f"{_cut(key)} = {_cut(_shown(value))}: {allowed}")
+        super().__init__(printable(f"{_cut(key)} = {_cut(_shown(value))}: {allowed}"))
 
 
 class SolveError(FemmembraneError, RuntimeError):
@@ -115,6 +119,11 @@ def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
     near = difflib.get_close_matches(str(name)[:80], known, n=1, cutoff=0.5)
     hint = f"unknown; did you mean {near[0]!r}? " if near else "unknown; "
     return InputError(key, name, hint + "known: " + ", ".join(known))
+
+
+def printable(text: str) -> str:
+    """A text that may be written to a terminal: what could move its cursor, or do worse, is spelled out (\\x1b)."""
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 #: items of a list that a message may show

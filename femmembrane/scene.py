@@ -502,13 +502,15 @@ class Scene:
         Raises
         ------
         InputError
-            When a material, source or mesh has no name in scene files.
-        OSError
-            When the file cannot be written.
+            When a material, source or mesh has no name in scene files, or the file cannot be written.
         """
         import tomli_w
 
-        Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8", newline="\n")
+        from .results.store import replace_file
+
+        text = tomli_w.dumps(self.to_dict())
+        with replace_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 # --- reading and writing tables
@@ -522,10 +524,11 @@ def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
     InputError
         When the file cannot be read or is no TOML (with the line).
     """
+    from .results.files import read_bytes
+
     path = Path(path)
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
+        data = read_bytes(path, MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise InputError("scene", str(path), f"larger than {MAX_BYTES} bytes; the path of a scene file (TOML) is allowed")
         text = data.decode("utf-8-sig")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Literal
 
 from ..errors import InputError
-from .outcome import DONE
+from .outcome import DONE, say
 
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 
@@ -27,5 +26,5 @@ def install_completion(*, shell: Shell | None = None) -> int:
         script = app.install_completion(shell=shell or detect_shell())
     except ShellDetectionError:
         raise InputError("--shell", None, "the shell was not recognised; bash, zsh, fish and powershell are allowed") from None
-    sys.stdout.write(f"written: {script}\nA new shell completes femmembrane.\n")
+    say(f"written: {script}\nA new shell completes femmembrane.\n")
     return DONE

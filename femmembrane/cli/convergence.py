@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused
+from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused, say
 
 
 def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
@@ -32,11 +32,9 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
 
     asked = read(scene, changes)
     meshes = {"degrees": _numbers("--degrees", degrees, MAX_DEGREE), "elements": _numbers("--elements", elements)}
-    prepare(out)
-    from ..results.lock import locked
     from ..verbs.convergence import convergence_of_run
 
-    with locked(out), Interrupts() as interrupts:
+    with working(out, ("convergence.csv", "convergence.png")), Interrupts() as interrupts:
         try:
             study = convergence_of_run(asked, **meshes)
         except SolveError as error:
@@ -52,7 +50,7 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
     if study.messages:
         return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
     if sys.stdout.isatty():
-        sys.stdout.write("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
+        say("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
     return DONE
 
 

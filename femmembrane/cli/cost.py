@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused
+from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused, say
 
 
 def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False) -> int:
@@ -27,12 +27,10 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
         Few meshes, each measured once: seconds in place of minutes.
     """
     asked = read(scene, changes)
-    prepare(out)
-    from ..results.lock import locked
     from ..verbs.cost import QUICK, asked_load
     from ..verbs.cost import cost as measure
 
-    with locked(out), Interrupts() as interrupts:
+    with working(out, ("cost.csv", "cost.png")), Interrupts() as interrupts:
         try:
             study = measure(asked, **asked_load(asked) | (dict(QUICK) if quick else {}))
         except SolveError as error:
@@ -45,5 +43,5 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if sys.stdout.isatty():
-        sys.stdout.write(f"{study}\n")
+        say(f"{study}\n")
     return DONE

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .folders import finished
-from .outcome import DONE
+from .outcome import DONE, say
 
 
 def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | None = None) -> int:
@@ -36,5 +36,5 @@ def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | Non
     file = out or (folder if folder.is_dir() else folder.parent) / f"export{suffix}"
     files = write(finished(folder), file, step=step)
     if sys.stdout.isatty():
-        sys.stdout.write(f"written:\n  {files[-1]}\n")
+        say(f"written:\n  {files[-1]}\n")
     return DONE

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,17 +53,59 @@ def _bundled(name: str) -> Path:
     return known[name]
 
 
-def prepare(out: Path) -> None:
-    """Make the folder and write to it once, before hours are spent on what could not be kept."""
-    import tempfile
+@contextmanager
+def working(out: Path, names: Iterable[str] = (), folders: Iterable[str] = ()) -> Iterator[None]:
+    """Hold a folder for results, made when there is none, and tried before hours are spent on what could not be kept.
+
+    What a killed command left unfinished in it is removed; if nothing is written to a folder that was made here, it goes again.
+
+    Parameters
+    ----------
+    out
+        The folder.
+    names, folders
+        Of the files and folders that will be written to it.
+
+    Raises
+    ------
+    InputError
+        When the folder cannot be written to, when something that is not to be replaced stands in the way, or when it is in use.
+    """
+    made = _make(out)
+    from ..results.files import refuse_obstacles, remove_leftovers
+    from ..results.lock import locked
 
     try:
+        refuse_obstacles(out, names, folders)
+        with locked(out):
+            for folder in (out, *(out / name for name in folders)):
+                remove_leftovers(folder)
+            yield
+    finally:
+        _remove_empty(made)
+
+
+def _make(out: Path) -> list[Path]:
+    """Make the folder, and write to it once; the folders that were not there before, the innermost first."""
+    import tempfile
+
+    made: list[Path] = []
+    try:
+        made += [folder for folder in (out, *out.parents) if not folder.exists()]
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out) as probe:
             probe.write(b"femmembrane")
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        _remove_empty(made)
         reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
         raise InputError("--out", str(out), f"cannot be written ({reason}); a folder, there already or to be made, is allowed") from None
+    return made
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    for folder in folders:
+        with suppress(OSError, ValueError):
+            folder.rmdir()
 
 
 def finished(folder: Path) -> Branch:

@@ -8,19 +8,36 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from ..errors import InputError, NotWrittenError, Status
+from ..errors import InputError, NotWrittenError, Status, printable
 
 DONE, BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, INTERRUPTED = 0, 2, 3, 4, 130
 
 
+#: characters that a message has at most: the middle of a longer one is left out
+_LONGEST = 900
+
+
 def fail(code: int, message: str) -> int:
     line = " ".join(message.split())
+    if len(line) > _LONGEST:
+        line = f"{line[: _LONGEST * 3 // 4]} ... {line[-_LONGEST // 4 :]}"
     try:
-        sys.stderr.write(f"femmembrane: {line}\n")
+        _write(sys.stderr, f"femmembrane: {line}\n")
         sys.stderr.flush()
     except OSError:  # nobody can be told; the exit code stays
         drop(sys.stderr)
     return code
+
+
+def say(text: str) -> None:
+    """Write to standard output."""
+    _write(sys.stdout, text)
+
+
+def _write(stream: TextIO, text: str) -> None:
+    """The one way in which text that may come from files and options goes to a terminal."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    stream.write(printable(text).encode(encoding, "backslashreplace").decode(encoding))
 
 
 def open_streams() -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Status
 from .folders import finished
-from .outcome import DONE
+from .outcome import DONE, say
 
 if TYPE_CHECKING:
     from ..results.records import Branch
@@ -29,32 +28,23 @@ def report(folder: Path, /, *, out: Path | None = None) -> int:
     """
     page = write(folder, out)
     if sys.stdout.isatty():
-        sys.stdout.write(f"written:\n  {page}\n")
+        say(f"written:\n  {page}\n")
     return DONE
 
 
 def write(folder: Path, out: Path | None = None) -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
+    from ..results.files import remove_leftovers
+    from ..results.output import read_record
     from ..views.report import write_report
 
     inside = folder if folder.is_dir() else folder.parent
-    facts = _facts(inside / "run.json") if folder.is_dir() else {}
+    facts = (read_record(folder) or {}) if folder.is_dir() else {}
     branch = _without_equilibria(facts) if facts.get("equilibria") == 0 else finished(folder)
     page = inside / "report.html" if out is None else out
+    remove_leftovers(page.parent)
     write_report(branch, page, facts)
     return page
-
-
-def _facts(file: Path) -> dict[str, Any]:
-    try:
-        facts = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:  # a branch that was saved on its own
-        return {}
-    except (OSError, ValueError) as error:
-        raise InputError("folder", str(file), f"the run.json of a run is needed ({error})") from None
-    if not isinstance(facts, dict):
-        raise InputError("folder", str(file), "the run.json of a run is needed")
-    return facts
 
 
 def _without_equilibria(facts: dict[str, Any]) -> Branch:
@@ -63,6 +53,6 @@ def _without_equilibria(facts: dict[str, Any]) -> Branch:
     from ..scene import Scene
 
     try:
-        return Branch(Scene.from_dict(facts["scene"]), (), Status(facts["status"]), str(facts["message"]), facts["timings"])
-    except (KeyError, ValueError) as error:
+        return Branch(Scene.from_dict(facts["scene"]), (), Status(facts["status"]), facts["message"], facts["timings"])
+    except (KeyError, ValueError, RecursionError) as error:
         raise InputError("folder", "run.json", f"the run.json of a run is needed ({error})") from None

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
 from .progress import observer
 from .report import write as write_report
 
@@ -42,13 +43,10 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         Write report.html as well, one page about the run.
     """
     asked = read(scene, changes)
-    prepare(out)
-    from ..results.checkpoint import Checkpoints, same_scene, unfinished
-    from ..results.lock import locked
-    from ..results.output import clean
+    from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
+    from ..results.files import RUN_FILES, SURFACES_FOLDER
 
-    with locked(out), Interrupts() as interrupts:
-        clean(out)
+    with working(out, (*RUN_FILES, NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
         kept = unfinished(out) if resume else None
         if kept is not None:
             same_scene(asked, kept, "--resume")
@@ -56,7 +54,10 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
             return ended
         checkpoints = Checkpoints(out, kept)
         interrupts.hold = True  # until the next equilibrium: raised inside a compiled solver it is swallowed, with a warning from there
+        for remark in checkpoints.remarks:
+            fail(DONE, remark)
         branch, code, message = _compute(asked, interrupts, checkpoints)
+        branch = replace(branch, remarks=checkpoints.remarks) if checkpoints.remarks else branch
         if code == INTERRUPTED and not len(branch):  # whatever an earlier run left in the folder is worth more
             raise KeyboardInterrupt
         try:
@@ -75,7 +76,7 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
     if sys.stdout.isatty():
-        sys.stdout.write(_summary(branch, written))
+        say(_summary(branch, written))
     return DONE
 
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError
-from .outcome import DONE
+from .outcome import DONE, say
 
 #: the source tree, if the package is run from one: its scenes are among the demos
 _TREE = Path(__file__).parents[2]
@@ -61,7 +61,7 @@ def scenes() -> int:
     width = max((len(name) for name in found), default=0)
     for name, path in found.items():
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
-        sys.stdout.write(f"{name:<{width}}  {title}\n")
+        say(f"{name:<{width}}  {title}\n")
     return DONE
 
 
@@ -84,7 +84,7 @@ def new(name: str, /) -> int:
         reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
         raise InputError("name", name, f"{path} cannot be written ({reason})") from None
     if sys.stdout.isatty():
-        sys.stdout.write(f"written: {path}\nNext: femmembrane run {path} --out out\n")
+        say(f"written: {path}\nNext: femmembrane run {path} --out out\n")
     return DONE
 
 

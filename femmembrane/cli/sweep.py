@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .folders import Changes, prepare, read
+from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, refused
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, refused, say
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -77,13 +77,10 @@ def sweep(
         grid[key] = values
     what: dict[str, Any] = {"quantity": quantity, "pressure": pressure, "volume": volume, "direction": direction, "workers": workers}
     if dry_run:
-        sys.stdout.write(f"{plan_sweep(asked, grid, out=out, **what)}\n")
+        say(f"{plan_sweep(asked, grid, out=out, **what)}\n")
         return DONE
-    prepare(out)
     done = [0, 0]
-    from ..results.lock import locked
-
-    with locked(out), Interrupts() as interrupts, _observer() as progress:
+    with working(out, ("sweep.nc", "sweep.png", "scenes.sqlite")), Interrupts() as interrupts, _observer() as progress:
 
         def on_scene(count: int, total: int, failed: int) -> None:
             done[:] = count, total
@@ -111,7 +108,7 @@ def sweep(
     if not results:
         return fail(NOT_CONVERGED, f"no scene has a result; the reasons are in {written[0]}")
     if sys.stdout.isatty():
-        sys.stdout.write("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
+        say("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
     return DONE
 
 

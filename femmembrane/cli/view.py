@@ -37,8 +37,11 @@ def view(
     movie
         GIF or MP4 file to write (MP4 with imageio[ffmpeg] installed).
     """
+    from ..results.files import remove_leftovers
     from ..views.show import view as show
 
+    for file in filter(None, (screenshot, movie)):
+        remove_leftovers(file.parent)
     try:
         show(finished(folder), color=color, step=step, mode=mode, screenshot=screenshot, movie=movie)
     except SolveError as error:

@@ -16,7 +16,11 @@ from typing import Any
 
 import numpy as np
 
+#: a point that a solver tries may lie beyond the axis, or on a point: its strains are infinite or NaN, which whoever tries it sees
+_anywhere = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
+
+@_anywhere
 def hencky_strains(R: Any, R_s: Any, Z_s: Any, u: Any, u_s: Any, w_s: Any) -> tuple[Any, Any]:
     """Logarithmic strains (e_1, e_2), meridional and circumferential.
 
@@ -28,6 +32,7 @@ def hencky_strains(R: Any, R_s: Any, Z_s: Any, u: Any, u_s: Any, w_s: Any) -> tu
     return meridional_strain(R_s, Z_s, u_s, w_s), np.log1p(u / R)
 
 
+@_anywhere
 def meridional_strain(R_s: Any, Z_s: Any, u_s: Any, w_s: Any) -> Any:
     """e_1 = log lambda_1 from the slopes alone; defined at the pole, where u/R is not."""
     green = (2 * (R_s * u_s + Z_s * w_s) + u_s**2 + w_s**2) / (R_s**2 + Z_s**2)

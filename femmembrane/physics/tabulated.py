@@ -87,8 +87,13 @@ class Tabulated(Source):
         InputError
             When the file cannot be read, or its points are no grid.
         """
+        from ..results.files import read_bytes
+
         try:
-            columns = np.genfromtxt(path, delimiter=",", names=True, dtype=float, ndmin=1)
+            lines = [line for line in read_bytes(path).decode("utf-8-sig").splitlines() if line.strip()]
+            if len(lines) < 2:
+                raise ValueError("there are no points in it")
+            columns = np.genfromtxt(lines, delimiter=",", names=True, dtype=float, ndmin=1)
             rho, z, h_rho, h_z = (columns[name] for name in ("rho", "z", "h_rho", "h_z"))
         except (OSError, ValueError, IndexError) as error:
             raise InputError("source", str(path), f"a CSV file with columns rho, z, h_rho, h_z is allowed ({error})") from None

@@ -7,13 +7,17 @@ holds the memory that predicts the next one.
 from __future__ import annotations
 
 import contextlib
+import json
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .store import load, save
+from .origin import difference, origin
+from .store import branch_of, read_branch_file, save
+from .table import columns, estimated, value
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -39,16 +43,27 @@ class Checkpoints:
 
     def __init__(self, folder: Path, latest: Branch | None = None) -> None:
         self.path, self.latest = folder / NAME, latest
+        self.remarks = () if latest is None else latest.remarks
+        self._analysed = 0
         self._due = time.perf_counter() + PAUSE
 
     def __call__(self, branch: Branch) -> None:
         self.latest = branch
-        if time.perf_counter() >= self._due:
-            clock = time.perf_counter()
+        self._analyse(branch)
+        clock = time.perf_counter()
+        if clock >= self._due:
             with contextlib.suppress(OSError, InputError):  # room may be found before the end, and hours of work do not stop for this
                 self.save()
             now = time.perf_counter()
             self._due = now + max(PAUSE, (now - clock) / SHARE)
+
+    def _analyse(self, branch: Branch) -> None:
+        """Ask the new equilibria what the results will tell of them. They remember it, so that saving takes no longer than writing."""
+        names, (held, _) = columns(branch), estimated(branch.scene)
+        for equilibrium in branch.equilibria[self._analysed :]:
+            for name in names:
+                value(equilibrium, 0, name, held)
+        self._analysed = len(branch)
 
     def save(self) -> bool:
         """Save the branch so far; whether there is one.
@@ -60,7 +75,7 @@ class Checkpoints:
         """
         if self.latest is None:
             return False
-        save(self.latest, self.path)
+        save(replace(self.latest, remarks=self.remarks), self.path, {"origin": json.dumps(origin())})
         return True
 
     def remove(self) -> None:
@@ -69,7 +84,7 @@ class Checkpoints:
 
 
 def unfinished(folder: Path) -> Branch | None:
-    """The branch from which the run in a folder can go on, None without one.
+    """The branch from which the run in a folder can go on, None without one; it remarks where it was begun, if that was not here.
 
     Raises
     ------
@@ -77,12 +92,17 @@ def unfinished(folder: Path) -> Branch | None:
         When there is a checkpoint that cannot be read.
     """
     path = folder / NAME
-    if not path.exists():
-        return None
     try:
-        return load(path)
-    except InputError as error:
-        raise InputError("--resume", str(path), f"{error.allowed}; without --resume the run starts over") from error
+        if not path.exists():
+            return None
+        dataset = read_branch_file(path)
+        branch = branch_of(dataset, path)
+        began = json.loads(str(dataset.attrs.get("origin", "{}")))
+        remark = difference(began if isinstance(began, dict) else {}, origin())
+        return replace(branch, remarks=tuple(dict.fromkeys((*branch.remarks, *([remark] if remark else [])))))
+    except (InputError, OSError, ValueError) as error:
+        why = error.allowed if isinstance(error, InputError) else str(error)
+        raise InputError("--resume", str(path), f"{why}; without --resume the run starts over") from error
 
 
 def same_scene(asked: Scene, kept: Branch, key: str) -> Scene:

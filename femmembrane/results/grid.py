@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ..errors import InputError
-from .store import package_version, replace_file
+from .store import package_version, read_dataset, reason, write_dataset
 
 if TYPE_CHECKING:
     import xarray
@@ -99,8 +99,7 @@ def save_dataset(dataset: xarray.Dataset, path: str | PathLike[str]) -> None:
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }
-    with replace_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    write_dataset(dataset, path, encoding)
 
 
 def load_dataset(path: str | PathLike[str]) -> xarray.Dataset:
@@ -111,16 +110,18 @@ def load_dataset(path: str | PathLike[str]) -> xarray.Dataset:
     InputError
         When the file cannot be read or holds something else.
     """
-    import xarray
-
+    what = "a sweep written by femmembrane"
+    dataset = read_dataset(path, what)
     try:
-        with xarray.open_dataset(path, engine="h5netcdf") as file:
-            dataset = file.load()
-        known = all(key in dataset.coords for key in json.loads(dataset.attrs["over"])) and "quantity" in dataset.attrs
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError("path", str(path), f"a sweep written by femmembrane is needed ({error})") from None
-    if not known:
-        raise InputError("path", str(path), "a sweep written by femmembrane is needed")
+        keys = json.loads(dataset.attrs["over"])
+        shape = tuple(dataset[key].size for key in keys if dataset[key].dims == (key,))
+        words = all(isinstance(dataset.attrs[name], str) for name in ("quantity", "scene"))
+        whole = all(dataset[name].shape == shape for name in ("status", "message", "has_result", "seconds"))
+        whole = whole and dataset["has_result"].dtype == bool
+    except Exception as error:  # there is nothing that a file nobody wrote in this way could not lead to
+        raise InputError("path", str(path), f"{what} is needed ({reason(error)})") from None
+    if not (len(shape) == len(keys) > 0 and words and whole):
+        raise InputError("path", str(path), f"{what} is needed")
     return dataset
 
 

@@ -11,49 +11,53 @@ from datetime import datetime
 from pathlib import Path
 
 from ..errors import InputError
+from .files import lock, own_file
 
 NAME = ".lock"
+#: how the text in a lock begins; what holds another text is somebody else's file
+_HOLDER = b"process "
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Hold a folder; the system lets go of it when the process ends, however it ends.
 
-    On Windows, and on file systems that know no locks, nothing is held.
+    On file systems that know no locks nothing is held.
 
     Raises
     ------
     InputError
-        When another run holds it, with the number of its process.
+        When another run holds it, with the number of its process, or when its lock is no file of ours: a link, a pipe, a text.
     """
-    if sys.platform == "win32":
-        yield
-        return
     path = folder / NAME
     descriptor = _hold(path)
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(descriptor)
+        if sys.platform == "win32":  # which removes no file that is open
+            os.close(descriptor)
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        if sys.platform != "win32":
+            os.close(descriptor)
 
 
 def _hold(path: Path) -> int:
-    import fcntl
-
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        descriptor = own_file(path)
         try:
-            with suppress(OSError):  # a file system without locks
-                try:
-                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    holder = os.pread(descriptor, 200, 0).decode("utf-8", "replace").strip() or "another process"
-                    raise InputError("--out", str(path.parent), f"{holder} is writing to it; a folder of its own is allowed") from None
+            free = lock(descriptor)
+            os.lseek(descriptor, 0, os.SEEK_SET)
+            text = os.read(descriptor, 200).strip(b"\0")  # which is what a file may hold after the power failed
+            if text and not text.startswith(_HOLDER):
+                raise InputError(
+                    "--out", str(path.parent), f"{path.name} in it belongs to something else; remove it, or choose another folder"
+                )
+            if free is False:
+                holder = text.decode("utf-8", "replace").strip() or "another process"
+                raise InputError("--out", str(path.parent), f"{holder} is writing to it; a folder of its own is allowed")
             if _is(descriptor, path):
-                with suppress(OSError):  # a full disk: held all the same, by nobody in particular
-                    os.ftruncate(descriptor, 0)
-                    os.pwrite(descriptor, f"process {os.getpid()} on {platform.node()}, since {_now()},".encode(), 0)
+                _sign(descriptor)
                 return descriptor
         except BaseException:
             os.close(descriptor)
@@ -61,9 +65,16 @@ def _hold(path: Path) -> int:
         os.close(descriptor)  # its last holder removed it in between
 
 
+def _sign(descriptor: int) -> None:
+    with suppress(OSError):  # a full disk: held all the same, by nobody in particular
+        os.ftruncate(descriptor, 0)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        os.write(descriptor, f"process {os.getpid()} on {platform.node()}, since {_now()},".encode())
+
+
 def _is(descriptor: int, path: Path) -> bool:
     try:
-        return os.path.samestat(os.fstat(descriptor), path.stat())
+        return os.path.samestat(os.fstat(descriptor), path.lstat())
     except FileNotFoundError:
         return False
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import platform
-import re
 import tempfile
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
@@ -14,16 +14,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError, NotWrittenError
+from ..errors import InputError, NotWrittenError, Status
 from ..native import native
-from .store import package_version, replace_file, save
+from .files import RECORD, RUN_FILES, SURFACES_FOLDER, read_bytes, refuse_obstacles
+from .origin import NOTED_VERSIONS
+from .store import package_version, reason, replace_file, save
 from .table import write_csv, write_special_points_csv, write_zones_csv
 
 if TYPE_CHECKING:
     from .records import Branch
-
-#: distributions whose versions are noted in run.json
-NOTED_VERSIONS = ("femmembrane", "numpy", "scipy", "scikit-fem", "casadi")
 
 
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:
@@ -50,15 +49,16 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     Raises
     ------
     InputError
-        When the folder cannot be made or written to.
+        When the folder cannot be made or written to, or a folder or a link in it stands in the way.
     NotWrittenError
         When some files could not be written (a full disk); all others were.
     """
     from ..views.vtk import remove_surfaces
 
     folder = _writable(Path(directory))
+    refuse_obstacles(folder, RUN_FILES, (SURFACES_FOLDER,))
     writers = _writers(branch, command)
-    for stale in {*_ALL, RECORD} - (writers.keys() - {RECORD}):
+    for stale in {*RUN_FILES, RECORD} - (writers.keys() - {RECORD}):
         (folder / stale).unlink(missing_ok=True)
     if SURFACES not in writers:
         remove_surfaces(folder / SURFACES)
@@ -74,37 +74,64 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     if failed:
         first = next(iter(failed.values()))
         raise NotWrittenError(first.strerror or str(first), failed) from first
-    return [folder / name for name in _ALL if name in writers]
-
-
-def clean(folder: Path) -> None:
-    """Remove what a killed run may have left: files that were still to take their places, under names that only :mod:`.store` makes."""
-    for path in (*folder.iterdir(), *folder.glob("membrane/.*")):
-        match = re.fullmatch(r"\.(.+)\.[0-9a-f]{8}(\.\w+)", path.name)
-        if match and ((match[1] + match[2]) in _OURS or re.fullmatch(r"membrane_\d{4,}\.vtu", match[1] + match[2])):
-            path.unlink()
+    return [folder / name for name in RUN_FILES if name in writers]
 
 
 def read_record(folder: Path) -> dict[str, Any] | None:
-    """``run.json`` of a folder that a run has completed, None without one that can be read."""
+    """``run.json`` of a folder that a run has completed, None without one.
+
+    Raises
+    ------
+    InputError
+        When it is not what a run has written.
+    """
+    path = folder / RECORD
     try:
-        facts = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        facts = json.loads(read_bytes(path).decode("utf-8"))
+        _check_record(facts)
+    except FileNotFoundError:
         return None
-    return facts if isinstance(facts, dict) and facts.keys() >= {"scene", "status", "message", "equilibria"} else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError("folder", str(path), f"the run.json of a run is needed ({reason(error)})") from None
+    facts.pop("digest", None)
+    return dict(facts)
 
 
-_ALL = (
-    *("branch.csv", "special_points.csv", "zones.csv", "run.json"),
-    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
-    "report.html",  # written from the rest, by whom it is asked for
-)
+def _check_record(facts: dict[str, Any]) -> None:
+    """Raise ValueError (or what a value of another type leads to) for what is no record or was changed; old ones have no digest."""
+    digest = facts.pop("digest", None)
+    # the name of the digest may be what was damaged
+    if digest != _digest(facts) if digest is not None else not facts.keys() <= _FACTS:
+        raise ValueError("it was damaged or changed after it was written")
+    Status(facts["status"])
+    texts = [
+        facts["message"],
+        *(facts[name] for name in ("mesh", "platform", "written") if name in facts),
+        *facts.get("versions", {}).values(),
+    ]
+    numbers = [facts["equilibria"], facts.get("processors") or 1, *facts.get("timings", {}).values()]
+    command = facts.get("command")
+    if not (
+        isinstance(facts["scene"], dict)
+        and all(isinstance(text, str) for text in [*texts, *(command if isinstance(command, list) else [command or ""])])
+        and all(isinstance(number, (int, float)) and number >= 0 for number in numbers)
+        and isinstance(facts["equilibria"], int)
+    ):
+        raise ValueError("a value of another type stands in it")
 
 
-RECORD, SURFACES = "run.json", "membrane.pvd"
+def _digest(facts: dict[str, Any]) -> str:
+    return hashlib.blake2b(json.dumps(facts, sort_keys=True).encode(), digest_size=16).hexdigest()
+
+
+SURFACES = "membrane.pvd"
+#: all that a record may hold beside its digest
+_FACTS = {
+    *("scene", "command", "mesh", "notes", "status", "message", "equilibria", "special_points", "timings", "compiled"),
+    *("versions", "platform", "processors", "written"),
+}
 #: what holds most in the least room first; the record makes the folder complete
-_WRITTEN = ("branch.nc", *(name for name in _ALL if name not in ("branch.nc", RECORD)), RECORD)
-_OURS = {*_ALL, "checkpoint.nc", *(f"{study}.{kind}" for study in ("convergence", "cost") for kind in ("csv", "png"))}
+_WRITTEN = ("branch.nc", *(name for name in RUN_FILES if name not in ("branch.nc", RECORD)), RECORD)
 
 
 def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Callable[[Path], object]]:
@@ -169,7 +196,7 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
 
 
 def _write_json(facts: dict[str, Any], path: Path) -> None:
-    text = json.dumps(facts, indent=2, ensure_ascii=False)
+    text = json.dumps({**facts, "digest": _digest(json.loads(json.dumps(facts)))}, indent=2, ensure_ascii=False)
     with replace_file(path) as temporary:
         # a name in the command that is no UTF-8 becomes the escape that JSON has for it
         temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
-from ..errors import InputError, Status, unknown_name
+from ..errors import InputError, Status, printable, unknown_name
 from ..threads import one_thread
 
 if TYPE_CHECKING:
@@ -318,6 +318,26 @@ class Jump:
     landing: Equilibrium
 
 
+class SoFar(Sequence[Equilibrium]):
+    """The equilibria that a growing list has now: taken after each step of a run, a copy would cost a time quadratic in the steps."""
+
+    def __init__(self, growing: list[Equilibrium]) -> None:
+        self._growing, self._count = growing, len(growing)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Equilibrium: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Equilibrium, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Equilibrium | tuple[Equilibrium, ...]:
+        places = range(self._count)[index]
+        return self._growing[places] if isinstance(places, int) else tuple(self._growing[k] for k in places)
+
+
 @dataclass(frozen=True, eq=False)
 class Branch(Sequence[Equilibrium]):
     """Equilibria in the order in which they were found.
@@ -325,7 +345,7 @@ class Branch(Sequence[Equilibrium]):
     Attributes
     ----------
     scene : Scene
-    equilibria : tuple of Equilibrium
+    equilibria : sequence of Equilibrium
     status : Status
         How the run ended; with a ``message`` unless all went well.
     timings : mapping of str to float
@@ -336,10 +356,12 @@ class Branch(Sequence[Equilibrium]):
         Where a run snapped because the branch turned back before a load, or lost its stability at a branch point.
     solver : str
         Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
+    remarks : tuple of str
+        What is to be known of how the run went on, such as that another processor began it.
     """
 
     scene: Scene
-    equilibria: tuple[Equilibrium, ...]
+    equilibria: Sequence[Equilibrium]
     status: Status = Status.CONVERGED
     message: str = ""
     timings: Mapping[str, float] = field(default_factory=dict)
@@ -347,6 +369,7 @@ class Branch(Sequence[Equilibrium]):
     memory: PathMemory | None = field(default=None, repr=False)
     jumps: tuple[Jump, ...] = ()
     solver: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -409,7 +432,7 @@ class Branch(Sequence[Equilibrium]):
         zones = self.scene.analysis.wrinkling is not None
         head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {'under ' + c:<14}" for c in classes)
         head += "  zones" if zones else ""
-        lines = [self.scene.title, head] if self.scene.title else [head]
+        lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
             numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
             words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
@@ -428,11 +451,12 @@ class Branch(Sequence[Equilibrium]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was repaired of the points of the mesh, and what was done about motions of the membrane as a whole that nothing resists."""
+        """The remarks, what was repaired of the points of the mesh, and what was done about motions of the membrane as a whole that nothing
+        resists."""
         from ..discretization.space import space_of_scene
 
         repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
-        return () if self.scene.open else repaired + space_of_scene(self.scene).notes
+        return self.remarks if self.scene.open else (*self.remarks, *repaired, *space_of_scene(self.scene).notes)
 
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import io
 import json
-import secrets
+import os
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 
 from ..discretization.meridian import side
 from ..errors import InputError, Status
+from . import files
 
 if TYPE_CHECKING:
     import xarray
@@ -109,6 +112,10 @@ _SPECIAL, _LIMIT = "special_", "limit_"
 _STABLE = {"stable": True, "unstable": False, "marginal": None}
 #: in place of a number of negative directions that was not determined
 _UNCOUNTED = -1
+#: seconds after which another process is thought not to come back from a file
+_PATIENCE = 60.0
+#: bytes of values that one byte of a file may hold at most: what its compression reaches
+_UNFOLDED = 1100
 
 
 @contextmanager
@@ -124,10 +131,13 @@ def replace_file(path: str | PathLike[str]) -> Iterator[Path]:
         When the folder does not exist or cannot be written to.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    if not path.name or "\0" in str(path):
+        raise InputError("path", str(path), "the name of a file in an existing, writable folder is needed")
+    temporary = files.temporary_name(path)
     try:
-        yield temporary
-        replace(temporary, path)
+        with files.claimed(temporary):
+            yield temporary
+            replace(temporary, path)
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
         raise InputError("path", str(path), f"a file in an existing, writable folder is needed ({error.strerror})") from error
     finally:
@@ -166,18 +176,25 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
 
 
-def save(branch: Branch, path: str | PathLike[str]) -> None:
-    """Write a branch to a NetCDF file, from which :func:`load` brings it back to the last bit."""
-    dataset = to_xarray(branch)
+def save(branch: Branch, path: str | PathLike[str], facts: Mapping[str, str] | None = None) -> None:
+    """Write a branch to a NetCDF file, from which :func:`load` brings it back to the last bit; ``facts`` are further attributes of it."""
+    dataset = to_xarray(branch).assign_attrs(facts or {})
     encoding = {
         str(name): {"_FillValue": None, **({"zlib": True, "complevel": 1, "shuffle": True} if variable.ndim == 2 and variable.size else {})}
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }
+    write_dataset(dataset, path, encoding)
+
+
+def write_dataset(dataset: xarray.Dataset, path: str | PathLike[str], encoding: Mapping[str, Any]) -> None:
+    """Write a data set to a sealed NetCDF file, whole or not at all."""
     image = io.BytesIO()  # HDF5 itself does not survive a full disk: it is met here, by one plain write
-    dataset.to_netcdf(image, engine="h5netcdf", encoding=encoding)
+    marked = dataset.assign_attrs(seal=f"{files.SEAL} its digest is the last line of the file, and of all before that line")
+    marked.to_netcdf(image, engine="h5netcdf", encoding=encoding)
+    content = files.sealed(image.getvalue())
     with replace_file(path) as temporary:
-        temporary.write_bytes(image.getvalue())  # a view of it would outlive it when the write fails
+        temporary.write_bytes(content)
 
 
 def load(path: str | PathLike[str]) -> Branch:
@@ -188,12 +205,22 @@ def load(path: str | PathLike[str]) -> Branch:
     InputError
         When the file cannot be read, is not one of ours, or has a newer format.
     """
-    dataset = _read(path)
+    return branch_of(read_branch_file(path), path)
+
+
+def branch_of(dataset: xarray.Dataset, path: str | PathLike[str]) -> Branch:
+    """The branch of the data set that :func:`read_branch_file` read.
+
+    Raises
+    ------
+    InputError
+        When it is none of ours, or not complete.
+    """
     try:
         scene = scene_from_text(dataset.attrs["scene"])
         branch = _branch(dataset, scene)
-    except (KeyError, ValueError) as error:
-        raise InputError("path", str(path), f"a complete file written by femmembrane is needed ({error})") from error
+    except Exception as error:  # there is nothing that a file nobody wrote in this way could not lead to
+        raise InputError("path", str(path), f"a complete file written by femmembrane is needed ({reason(error)})") from error
     if not scene.open and _INSIDE[0] not in dataset.attrs and side(scene.mesh) < 0:
         what = "it is of a version that counted V and P of a membrane whose inside is above it as negative; compute it again"
         raise InputError("path", str(path), what)
@@ -365,6 +392,7 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "status": branch.status.value,
         "message": branch.message,
         **({"solver": branch.solver} if branch.solver else {}),
+        **({"remarks": json.dumps(branch.remarks)} if branch.remarks else {}),
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
         **_trace_attributes(branch.memory),
@@ -380,18 +408,97 @@ def _trace_attributes(memory: PathMemory | None) -> dict[str, Any]:
     return {"trace_step": memory.step, "trace_regular": memory.regular, **unexplained}
 
 
-def _read(path: str | PathLike[str]) -> xarray.Dataset:
+def read_dataset(path: str | PathLike[str], what: str) -> xarray.Dataset:
+    """All of a NetCDF file, after its digest was checked; nothing that it refers to outside of itself is read.
+
+    Files of earlier versions have no digest; neither has what another program wrote.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read or was damaged; ``what`` is needed in its place.
+    """
+    try:
+        content, whole = files.unsealed(files.read_bytes(path))
+        if not whole:
+            _try_out(content)
+        return parsed(content)
+    except Exception as error:  # there is nothing that libraries do not raise when they meet bytes that nobody wrote
+        raise InputError("path", str(path), f"{what} is needed ({reason(error)})") from error
+
+
+def parsed(content: bytes) -> xarray.Dataset:
+    """The data set in the bytes of a NetCDF file; raises anything for bytes that nobody wrote."""
     import xarray
 
+    _refuse_elsewhere(content)
+    # the values as they stand: no times, masks or scales are in our files
+    dataset = xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False, mask_and_scale=False)
+    dataset.attrs.pop("seal", None)
+    return dataset
+
+
+def _try_out(content: bytes) -> None:
+    """Let another process read bytes that no digest vouches for: of damaged ones HDF5 may never come back, or end the process."""
+    code = "import sys; from femmembrane.results.store import parsed; parsed(sys.stdin.buffer.read())"
+    places = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:
-        # the values as they stand: no times, masks or scales are in our files
-        dataset = xarray.load_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False)
-    except (OSError, ValueError) as error:
-        raise InputError("path", str(path), f"a NetCDF file written by femmembrane is needed ({error})") from error
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", code], input=content, capture_output=True, env=places, timeout=_PATIENCE, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise ValueError("it is damaged: to read it would take for ever") from None
+    if done.returncode not in (0, 1):  # 1: an exception, which is met here as well
+        raise ValueError("it is damaged: to read it would end the process")
+
+
+def reason(error: Exception) -> str:
+    """What went wrong while a file was read, in one line that is not too long."""
+    text = (error.strerror if isinstance(error, OSError) else None) or str(error)
+    if not isinstance(error, (OSError, ValueError)):
+        text = f"{type(error).__name__}: {text}"
+    line = " ".join(text.split())
+    return line if len(line) <= 200 else line[:197] + "..."
+
+
+def _refuse_elsewhere(content: bytes) -> None:
+    """Refuse a file of which a part is in another one, or that unfolds to much more than it can have held."""
+    import h5py
+
+    with h5py.File(io.BytesIO(content), "r") as file:
+        room = _UNFOLDED * len(content)
+        for name in file:
+            if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+                raise ValueError(f"{name!r} is a link")
+            part = file[name]
+            if not isinstance(part, h5py.Dataset):
+                raise ValueError(f"{name!r} is no variable")
+            if part.external or part.is_virtual:
+                raise ValueError(f"the values of {name!r} are in another file")
+            if not _only_a_dimension(part):
+                room -= part.size * part.dtype.itemsize
+            if room < 0:
+                raise ValueError("its variables are larger than it can hold")
+
+
+def _only_a_dimension(part: Any) -> bool:
+    """Whether a variable only gives a dimension its length: it has no values."""
+    return bytes(part.attrs.get("NAME", b"")).startswith(b"This is a netCDF dimension but not a netCDF variable")
+
+
+def read_branch_file(path: str | PathLike[str]) -> xarray.Dataset:
+    """The data set of a branch file; whether it is a complete branch is seen in :func:`branch_of`.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, is damaged, is not one of ours, or has a newer format.
+    """
+    dataset = read_dataset(path, "a NetCDF file written by femmembrane")
     if not {"format", "femmembrane_version", "scene"} <= set(dataset.attrs):
         raise InputError("path", str(path), "a NetCDF file written by femmembrane is needed; this one comes from elsewhere")
-    if dataset.attrs["format"] != FORMAT:
-        found = dataset.attrs["format"]
+    found = dataset.attrs["format"]
+    if not isinstance(found, (int, np.integer)) or found != FORMAT:
         raise InputError("path", str(path), f"format {FORMAT} is needed; this file has format {found}: use the version that wrote it")
     return dataset
 
@@ -411,10 +518,12 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
         special_points=_special_points(dataset, scene, _SPECIAL),
         status=Status(dataset.attrs["status"]),
         message=str(dataset.attrs["message"]),
-        timings=json.loads(dataset.attrs["timings"]),
+        timings={str(stage): float(seconds) for stage, seconds in json.loads(dataset.attrs["timings"]).items()},
         memory=_memory(dataset),
         jumps=_jumps(dataset, scene, equilibria),
-        solver=str(dataset.attrs.get("solver", "")),  # younger than the format
+        # younger than the format
+        solver=str(dataset.attrs.get("solver", "")),
+        remarks=tuple(map(str, json.loads(dataset.attrs.get("remarks", "[]")))),
     )
 
 
@@ -442,12 +551,16 @@ def _memory(dataset: xarray.Dataset) -> PathMemory | None:
 
     if "trace_sigma" not in dataset:
         return None
-    points, slopes = (np.array(dataset[name].values, dtype=np.float64) for name in ("trace_point", "trace_slope"))
-    sigma = tuple(dataset["trace_sigma"].values.tolist())
+    sigma = _finite(dataset, "trace_sigma", dataset.sizes["trace"])
+    shape = len(sigma), dataset.sizes["coefficient"] + 1
+    points, slopes = (_finite(dataset, name, *shape) for name in ("trace_point", "trace_slope"))
     if "trace_step" not in dataset.attrs:
-        return PathMemory(sigma, points, slopes)
-    unexplained = tuple(json.loads(dataset.attrs.get("trace_unexplained", "[]")))
-    return TraceMemory(sigma, points, slopes, float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"]), unexplained)
+        return PathMemory(tuple(sigma.tolist()), points, slopes)
+    unexplained = tuple(map(str, json.loads(dataset.attrs.get("trace_unexplained", "[]"))))
+    step, regular = float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"])
+    if not (len(sigma) and 0 < step < np.inf and 1 <= regular <= dataset.sizes["step"]):
+        raise ValueError("the memory of the trace does not belong to it")
+    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained)
 
 
 def _jumps(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:
@@ -456,17 +569,22 @@ def _jumps(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium,
     if "jump_index" not in dataset:
         return ()
     limits = iter(_special_points(dataset, scene, _LIMIT) or ())
-    located = zip(dataset["jump_index"].values.tolist(), dataset["jump_limit"].values.tolist(), strict=True)
+    located = list(zip(dataset["jump_index"].values.tolist(), dataset["jump_limit"].values.tolist(), strict=True))
+    if not all(0 <= index < len(equilibria) for index, _ in located):
+        raise ValueError("a snap lands on no equilibrium")
     return tuple(Jump(index, next(limits) if known else None, equilibria[index]) for index, known in located)
 
 
 def _equilibria(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> list[Equilibrium]:
     from .records import Equilibrium
 
-    states = np.array(dataset[prefix + "state"].values, dtype=np.float64)
+    count = len(dataset[prefix + "status"])
+    states = _finite(dataset, prefix + "state", count, _unknowns(scene) if count else dataset.sizes["coefficient"])
     states.flags.writeable = False
-    scalars = {name: dataset[prefix + name].values.tolist() for name in _SCALARS if prefix + name in dataset}
-    scalars.setdefault("magnetic_energy", [0.0] * len(states))
+    present = {"magnetic_energy": bool(scene.sources), "load_energy": bool(scene.loads)}
+    needed = [name for name in _SCALARS if (count and present.get(name, True)) or prefix + name in dataset]
+    scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
+    scalars.setdefault("magnetic_energy", [0.0] * count)
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},
@@ -475,8 +593,23 @@ def _equilibria(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> list
             scene=scene,
             state=states[k],
         )
-        for k in range(len(states))
+        for k in range(count)
     ]
+
+
+def _finite(dataset: xarray.Dataset, name: str, *shape: int) -> Array:
+    """The values of a variable, which must be numbers in this shape."""
+    values = dataset[name].values
+    if values.shape != shape or values.dtype.kind != "f" or not np.isfinite(values).all():
+        raise ValueError(f"{name} are no {' x '.join(map(str, shape))} finite numbers")
+    return np.array(values, dtype=np.float64)
+
+
+def _unknowns(scene: Scene) -> int:
+    """The number of unknowns of the states of a scene."""
+    from ..discretization.space import space_of_scene
+
+    return int(space_of_scene(scene).n_free)
 
 
 def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal: int) -> Iterator[Verdict]:

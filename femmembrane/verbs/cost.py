@@ -22,7 +22,7 @@ from ..accuracy.strong_form import StrongForm, prescribed
 from ..errors import InputError, SolveError, unknown_name
 from ..native import native
 from ..potential import Potential, potential_of
-from ..results.output import NOTED_VERSIONS
+from ..results.origin import NOTED_VERSIONS, processor
 from ..results.records import Branch, Equilibrium
 from ..results.store import package_version, replace_file, save
 from ..results.table import write_csv
@@ -260,23 +260,13 @@ def asked_load(scene: Scene) -> dict[str, Any]:
 def machine() -> dict[str, str]:
     """Processor, number of processors, system and versions."""
     return {
-        "processor": _processor(),
+        "processor": processor(),
         "processors": f"{os.cpu_count()} processors",
         "system": f"{platform.system()} {platform.machine()}",
         "python": f"Python {platform.python_version()}",
         **{name: f"{name} {package_version(name)}" for name in NOTED_VERSIONS},
         "compiled": "NumPy" if native() is None else "compiled",
     }
-
-
-def _processor() -> str:
-    """Its name where the system tells (Linux), or its kind."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
 
 
 def _whole(key: str, values: Sequence[int], most: int | None = None) -> None:

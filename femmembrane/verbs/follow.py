@@ -15,7 +15,7 @@ from ..errors import InputError, SolveError, Status, unknown_name
 from ..physics.checks import LARGEST, number
 from ..potential import Array, Potential, potential_of
 from ..results.checkpoint import same_scene
-from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
+from ..results.records import Branch, Equilibrium, Jump, PathMemory, SoFar, SpecialPoint
 from ..scene import MAX_STEPS, Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
@@ -266,7 +266,7 @@ def _follow(
             break
         if on_checkpoint is not None:
             memory = remembered(walk.path, potential.space.n_free)
-            so_far = Branch(scene, tuple(found), Status.INTERRUPTED, "interrupted", dict(timings), memory=memory, jumps=tuple(jumps))
+            so_far = Branch(scene, SoFar(found), Status.INTERRUPTED, "interrupted", dict(timings), memory=memory, jumps=tuple(jumps))
             on_checkpoint(replace(so_far, solver=used))
     branch = Branch(scene, tuple(found), status, message, timings, jumps=tuple(jumps), solver=used)
     if throw and message:

@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ import numpy as np
 from ..discretization.meridian import side
 from ..errors import InputError
 from ..memory import require
-from ..results.grid import dataset_of, load_dataset, save_dataset
+from ..results.grid import MEANING, dataset_of, load_dataset, save_dataset
 from ..results.kept import Kept
 from ..results.store import scene_text
 from ..scene import Scene
@@ -93,7 +93,11 @@ class Sweep:
 
         dataset = load_dataset(path)
         over = {key: tuple(dataset[key].values.tolist()) for key in json.loads(dataset.attrs["over"])}
-        return cls(scene_from_text(dataset.attrs["scene"]), over, dataset.attrs["quantity"], dataset)
+        try:
+            scene = scene_from_text(dataset.attrs["scene"])
+        except (ValueError, RecursionError) as error:
+            raise InputError("path", str(path), f"a sweep written by femmembrane is needed ({error})") from None
+        return cls(scene, over, dataset.attrs["quantity"], dataset)
 
     def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None) -> Any:
         """Maps over two keys, or curves over one, as a Matplotlib figure, also written to ``path`` if given.
@@ -376,8 +380,15 @@ def _computed(tasks: Iterator[pool.Task], workers: int | None, scheduler: str | 
 
 
 def _known(grid: _Grid, kept: Kept | None) -> dict[str, Row]:
-    found = {} if kept is None else {key: kept.get(key) for key in grid.distinct}
-    return {key: _compact(Row(**row)) for key, row in found.items() if row is not None}
+    """The rows that are kept; what is no whole row is none, and computed again."""
+    found = {} if kept is None else {key: _row(kept.get(key)) for key in grid.distinct}
+    return {key: row for key, row in found.items() if row is not None}
+
+
+def _row(kept: Mapping[str, Any] | None) -> Row | None:
+    if kept is None or kept.keys() != {f.name for f in fields(Row)} or not kept["values"].keys() <= MEANING.keys():
+        return None
+    return _compact(Row(**kept))
 
 
 def _keep(kept: Kept | None, key: str, row: Row) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..physics.checks import is_number, number
 from ..potential import Array, Potential, potential_of
-from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
+from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
 from ..solve import wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
@@ -319,7 +319,7 @@ class _Tracing:
         """Step until a target is met or the branch ends; the status, and a message unless a target was met."""
         while (end := self.advance(targets, ill_posed)) is None:
             if on_checkpoint is not None:
-                on_checkpoint(self.branch(Status.INTERRUPTED, "interrupted"))
+                on_checkpoint(self.branch(Status.INTERRUPTED, "interrupted", SoFar(self.found)))
         return end
 
     def advance(self, targets: Mapping[str, float], ill_posed: str) -> tuple[Status, str] | None:
@@ -432,8 +432,9 @@ class _Tracing:
             return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
         return error.status, str(error)
 
-    def branch(self, status: Status, message: str) -> Branch:
+    def branch(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
         path = remembered(self.tracer.path, self.potential.space.n_free)
         memory = TraceMemory(path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained))
         special = None if self.special is None else tuple(self.special)
-        return Branch(self.scene, tuple(self.found), status, message, dict(self.timings), special, memory, solver="newton")
+        found = tuple(self.found) if found is None else found
+        return Branch(self.scene, found, status, message, dict(self.timings), special, memory, solver="newton")

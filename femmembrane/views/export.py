@@ -28,6 +28,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..errors import InputError, unknown_name
+from ..results.files import remove_leftovers
 from ..results.store import replace_file
 from .stage import place_of
 from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
@@ -63,6 +64,8 @@ def export(shown: Branch | Equilibrium, path: str | PathLike[str], *, step: int 
     """
     suffix = Path(path).suffix.lower()
     check_format(suffix)
+    for folder in (Path(path).parent, *([Path(path).with_suffix("")] if suffix == ".pvd" else [])):
+        remove_leftovers(folder)
     branch = list(shown) if isinstance(shown, Sequence) else [shown]
     if not branch:
         raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
@@ -144,7 +147,8 @@ def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
     import h5py
 
     numbers, grids = path.with_suffix(".h5"), []
-    with replace_file(numbers) as temporary, h5py.File(temporary, "w") as file:
+    image = io.BytesIO()  # HDF5 itself does not survive a full disk
+    with h5py.File(image, "w") as file:
         revolution = Revolution.of_membrane(branch[0], smooth_profile(branch[0])["r"])
         mixed = [
             np.insert(cells, 0, code, axis=1).ravel() for code, cells in ((_TRIANGLE, revolution.triangles), (_QUAD, revolution.quads))
@@ -159,6 +163,8 @@ def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
             for name, values in data.items():
                 file.create_dataset(f"{step}/{name}", data=values, compression="gzip", compression_opts=1, shuffle=True)
             grids.append(_grid(numbers, file, f"{step}", topology, data, in_time=len(branch) > 1))
+    with replace_file(numbers) as temporary:
+        temporary.write_bytes(image.getvalue())
     head, foot = '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n', "\n</Domain></Xdmf>\n"
     text = grids[0]
     if len(grids) > 1:  # meshio reads one grid as a mesh, several as its TimeSeriesReader

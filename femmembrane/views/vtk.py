@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError
+from ..results.files import refuse_no_folder
 from ..results.store import replace_file
 
 if TYPE_CHECKING:
@@ -147,6 +148,7 @@ def write_collection(path: str | PathLike[str], count: int, write_one: Callable[
     if path.suffix != ".pvd":
         raise InputError("path", str(path), "a name that ends in .pvd is needed; the surfaces go to a folder beside it")
     files = [_surface_file(path, number) for number in range(count)]
+    refuse_no_folder(path.with_suffix(""))
     if files:
         _make_folder(files[0].parent)
     for number, file in enumerate(files):
@@ -159,7 +161,10 @@ def write_collection(path: str | PathLike[str], count: int, write_one: Callable[
 
 def remove_surfaces(path: Path, keep: int = 0) -> None:
     """Remove the VTU files that belong to a PVD file, but for the first few."""
-    for file in path.with_suffix("").glob("*.vtu"):
+    folder = path.with_suffix("")
+    if folder.is_symlink():  # whatever is there belongs to somebody else
+        return
+    for file in folder.glob("*.vtu"):
         number = re.fullmatch(re.escape(path.stem) + r"_(\d{4,})\.vtu", file.name)
         if number and int(number[1]) >= keep:
             file.unlink()

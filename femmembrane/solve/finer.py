@@ -12,7 +12,7 @@ from ..errors import Status
 from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from .banded import band_product
-from .continuation import first_point
+from .continuation import BranchPoint, first_point
 from .controls import ArcLengthControl, Control
 from .newton import NewtonResult, correct
 from .state import State, distance
@@ -47,17 +47,22 @@ def solved_finer(control: Control, potential: Potential, x: Array, pressure: flo
     return finer, solved_in(finer, control, potential, x, pressure)
 
 
+def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> NewtonResult:
+    """Where the branch of another space crosses the plane through a point of a branch, across its tangent: regular at every fold."""
+    state = point.state
+    start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
+    dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / onto.area
+    across = ArcLengthControl(dual, point.tangent_pressure, start, state.pressure)
+    return correct(onto, across, start, state.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
+
+
 def solved_past_folds(onto: Potential, control: Control, potential: Potential, state: State) -> NewtonResult:
     """As :func:`solved_in`, for a state next to a fold of the control.
 
     The branch of the other space is met first where it crosses the plane through the state across its tangent, which is regular at folds
     of every quantity, and then followed to the control.
     """
-    point = first_point(potential, state, 1)
-    start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
-    dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / onto.area
-    across = ArcLengthControl(dual, point.tangent_pressure, start, state.pressure)
-    met = correct(onto, across, start, state.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
+    met = met_across(onto, potential, first_point(potential, state, 1))
     if met.status is not Status.CONVERGED:
         return met
     return correct(onto, control, met.x, met.pressure, damped=True, max_iterations=_MAX_ITERATIONS)

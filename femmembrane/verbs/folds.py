@@ -16,7 +16,7 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Family
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
-from ..solve import wellposed
+from ..solve import resolution, wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
 from ..solve.parameter import Parameter
@@ -252,6 +252,9 @@ class _Following:
             if beyond:
                 bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
                 new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
+            scene = self.parameter.scene_at(new.number)
+            if unresolved := resolution.unresolved(self.system.family, self._state(new), scene):
+                return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
             self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
             self.add(new)
             if new.number in self.bounds:
@@ -276,8 +279,10 @@ class _Following:
 
     def _record(self, point: FoldPoint) -> Equilibrium:
         scene = self.parameter.scene_at(point.number)
-        state = State(point.x, point.pressure, point.evaluation, point.iterations, point.correction, point.residual, gap=0.0)
-        return record(scene, self.system.family, state)
+        return record(scene, self.system.family, self._state(point))
+
+    def _state(self, point: FoldPoint) -> State:
+        return State(point.x, point.pressure, point.evaluation, point.iterations, point.correction, point.residual, gap=0.0)
 
     def _clearance(self, point: FoldPoint) -> float:
         """Smallest distance between a node and a source."""

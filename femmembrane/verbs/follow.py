@@ -19,6 +19,7 @@ from ..scene import Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import correct
+from ..solve.resolution import refuse_unresolved
 from ..solve.search import Limit, beyond_limit
 from ..solve.special_points import ON_FOLD
 from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume
@@ -380,6 +381,7 @@ class _Walk:
         self.state, self.load = state, load
         if unresolved := unresolved_source(self.potential, self.state.x):
             raise SolveError(unresolved, status=Status.DIPOLE_CONTACT)
+        refuse_unresolved(self.potential, state)
         return self.state, turn
 
     def _through_flat(self, before: State, load: float, jump: bool) -> tuple[State, _Turn | None]:
@@ -457,4 +459,5 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
         )
     if held != gas.amount:
         state = march(potential, state, lambda amount: replace(gas, amount=amount), held, gas.amount)[-1]
+    refuse_unresolved(potential, state)
     return record(scene, potential, state, clock=clock, gas=gas)

@@ -94,5 +94,6 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
         f"searched: {len(search.traced)} traced stretch(es) ({spans}), starts at V = {', '.join(f'{v:g}' for v in search.starts)}, "
         f"{search.deflations} deflated solves ({search.iterations} iterations)"
         + (f"; {len(search.ill_posed)} ill-posed state(s) left out, whose shape depends on the mesh" if search.ill_posed else "")
+        + (f"; {len(search.unresolved)} state(s) left out that the mesh does not resolve" if search.unresolved else "")
     )
     return Equilibria(control, float(load), tuple(found[k] for k in order), tuple(float(energies[k]) for k in order), searched)

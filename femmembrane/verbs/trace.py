@@ -12,7 +12,7 @@ from ..errors import InputError, SolveError, Status, unknown_name
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
-from ..solve import wellposed
+from ..solve import resolution, wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_point, parity
 from ..solve.start import moderate, start_at_volume
@@ -248,6 +248,7 @@ class _Tracing:
             state = start_at_volume(potential, float(start))
         else:
             raise InputError("start", start, "a volume, an Equilibrium or a traced Branch is allowed")
+        resolution.refuse_unresolved(potential, state)
         tracing = cls(scene, potential, first_point(potential, state, direction), tracer, [], special, on_step, max_steps)
         tracing.timings["setup"] = time.perf_counter() - clock
         tracing.add(tracing.point, clock)
@@ -304,6 +305,8 @@ class _Tracing:
         segment = Segment(self.potential, self.point, new)
         met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
+        if unresolved := resolution.unresolved(self.potential, (last or new).state):
+            return Status.NOT_RESOLVED, f"at {self._place(last or new)} {unresolved}"
         if self.special is not None:
             self._look_for_special_points(segment, last)
         self.add(last or new, clock)
@@ -324,9 +327,11 @@ class _Tracing:
         bad = wellposed.ill_posed(self.potential, point.state.evaluation)
         if bad is None:
             return None
+        return bad.status, f"at {self._place(point)} {bad}, and what a mesh finds beyond depends on the mesh"
+
+    def _place(self, point: BranchPoint) -> str:
         height = self.potential.space.center_height(point.state.x)
-        where = f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
-        return bad.status, f"at {where} {bad}, and what a mesh finds beyond depends on the mesh"
+        return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
 
     def add(self, point: BranchPoint, clock: float) -> None:
         solved = time.perf_counter()

@@ -13,10 +13,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import SolveError, Status
-from ..potential import Array, Potential, potential_of
+from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
+from .banded import negative_directions
 from .continuation import first_point
-from .finer import met_across
+from .controls import VolumeControl
+from .finer import met_across, moved, solved_in, transferred
+from .newton import NewtonResult
 from .state import State
 from .wellposed import ill_posed, unresolved_source
 
@@ -26,6 +29,10 @@ _KINK, _KINK_STRAIGHT = 0.1, 0.4
 _SMOOTH = 0.2
 #: change of the largest logarithmic stretch from mesh to mesh at which the state is the same one
 _STEADY = 0.1
+#: meridional stress beside a kink, over the median one of the membrane, below which it is the stress that fails and not the mesh
+_WEAK = 0.1
+#: change of the membrane, relative to its size, up to which a state at the same volume is the same one
+_NEAR = 0.2
 #: most halvings, and elements beyond which none is halved
 _HALVINGS, _MOST_ELEMENTS = 3, 4096
 
@@ -40,17 +47,18 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
         The scene of the state, where it is not that of the potential.
     """
     scene = potential.scene if scene is None else scene
-    kinks = potential.space.kinks(state.x)
+    space = potential.space
+    kinks = space.kinks(state.x)
     worst = float(kinks.max(initial=0.0))
-    if worst <= (_KINK_STRAIGHT if scene.degree == 1 else _KINK):
+    if worst <= (_KINK_STRAIGHT if scene.degree == 1 else _KINK) or not space.n_elements > 1:  # one element is no mesh to judge
         return ""
-    # states with a verdict of their own: compressed or slack, or too close to a source
-    if ill_posed(potential, state.evaluation) is not None or unresolved_source(potential, state.x):
+    where = int(kinks.argmax())
+    if _judged_otherwise(potential, state, where):
         return ""
-    reason = _lost_on_finer_meshes(potential if scene is potential.scene else potential_of(scene), state, worst)
+    reason = _lost_on_finer_meshes(potential if scene is potential.scene else potential_of(scene), state, where)
     if not reason:
         return ""
-    radius = float(potential.space.kink_radii[int(kinks.argmax())])
+    radius = float(space.kink_radii[where])
     return f"the mesh does not resolve the membrane at r = {radius:.3g}, where its slope jumps by {worst:.0%}: {reason}"
 
 
@@ -60,27 +68,60 @@ def refuse_unresolved(potential: Potential, state: State, scene: Scene | None = 
         raise SolveError(f"{reason} (V = {state.volume:.6g}, P = {state.pressure:.6g})", status=Status.NOT_RESOLVED)
 
 
-def _lost_on_finer_meshes(potential: Potential, state: State, kink: float) -> str:
-    """What becomes of the state as elements are halved; empty where it is found again."""
-    first, largest, reason = kink, _largest_stretch(potential, state.x), ""
+def _judged_otherwise(potential: Potential, state: State, where: int) -> bool:
+    """Whether a kink belongs to a state with a verdict of its own: compressed or slack, or almost so there, or too close to a source."""
+    space, stress = potential.space, state.evaluation.stress
+    inner = space.n_elements - 1
+    beside = [where, where + 1] if where < inner else [0 if where == inner and space.on_axis[0] else inner]
+    weakest = stress[0].reshape(space.R.shape)[:, beside].min()
+    if weakest < _WEAK * np.median(np.abs(stress)) or ill_posed(potential, state.evaluation) is not None:
+        return True
+    return bool(unresolved_source(potential, state.x))
+
+
+def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str:
+    """What becomes of the state as elements are halved; empty where it is found again and loses its kinks."""
+    first = largest_kink(potential, state.x)
+    # the tip that a source draws out becomes round on very small elements alone, but its stretches are right long before
+    tip = bool(potential.sources) and where >= potential.space.n_elements - 1
+    largest = _largest_stretch(potential, state.x)
     for halving in range(_HALVINGS):
-        scene = potential.scene
+        scene, before = potential.scene, largest
         if halving and 2 * scene.mesh.elements > _MOST_ELEMENTS:
             break
-        degree = min(scene.degree + (halving == 0), MAX_DEGREE)
-        onto = potential_of(scene.replace(mesh=scene.mesh.refined(), degree=degree))
-        met = met_across(onto, potential, first_point(potential, state, 1))
-        if met.status is not Status.CONVERGED:
-            return f"on {onto.space.n_elements} elements of degree {degree} no such state was found"
-        potential, state, before = onto, State.of(met), largest
-        kink, largest = float(onto.space.kinks(met.x).max(initial=0.0)), _largest_stretch(onto, met.x)
-        if kink <= _SMOOTH or abs(largest - before) <= _STEADY:
+        finer = scene.replace(mesh=scene.mesh.refined())
+        degrees = [scene.degree] if halving or scene.degree == MAX_DEGREE else [scene.degree + 1, scene.degree]
+        for onto in (potential_of(finer.replace(degree=degree)) for degree in degrees):
+            if (met := _found_again(onto, potential, state)) is not None:
+                break
+        else:
+            return f"no such state was found on {onto.space.n_elements} elements"
+        potential, state = onto, State.of(met)
+        kink, largest = largest_kink(potential, state.x), _largest_stretch(potential, state.x)
+        if kink <= min(_SMOOTH, first / 2) or (tip and kink <= 1.01 * first and abs(largest - before) <= _STEADY):
             return ""
-        reason = (
-            f"on {onto.space.n_elements} elements of degree {degree} the largest stretch is {np.exp(largest - before):.2g} times as large, "
-            f"and the slope jumps by {kink:.0%}"
-        )
-    return reason if kink > first / 2 else ""
+    change = f"the largest stretch is {np.exp(largest - before):.2g} times as large as on half as many, and the slope jumps by {kink:.0%}"
+    return f"on {potential.space.n_elements} elements {change}"
+
+
+def largest_kink(potential: Potential, x: Array) -> float:
+    """The largest of :meth:`.Space.kinks`."""
+    return float(potential.space.kinks(x).max(initial=0.0))
+
+
+def _found_again(onto: Potential, potential: Potential, state: State) -> NewtonResult | None:
+    """The state in a finer space: at the same volume and on the same side of its folds, or else across the branch, which has no folds."""
+    result = solved_in(onto, VolumeControl(state.volume), potential, state.x, state.pressure, damped=True)
+    if result.status is Status.CONVERGED and _side(onto, result.evaluation) == _side(potential, state.evaluation):
+        if moved(onto, result.x, transferred(potential.space, state.x, onto.space)) <= _NEAR:
+            return result
+    result = met_across(onto, potential, first_point(potential, state, 1))
+    return result if result.status is Status.CONVERGED else None
+
+
+def _side(potential: Potential, evaluation: Evaluation) -> int:
+    """Number of negative directions at constant volume: changes at every fold in the volume."""
+    return negative_directions(evaluation.band, potential.space.half_bandwidth, evaluation.volume_gradient)
 
 
 def _largest_stretch(potential: Potential, x: Array) -> float:

@@ -10,6 +10,8 @@ not found again, or grows.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from ..errors import SolveError, Status
@@ -19,9 +21,9 @@ from .banded import negative_directions
 from .continuation import first_point
 from .controls import VolumeControl
 from .finer import met_across, moved, solved_in, transferred
-from .newton import NewtonResult
 from .state import State
-from .wellposed import ill_posed, unresolved_source
+from .stepping import march
+from .wellposed import ill_posed, poles_by_sources
 
 #: relative kink that is looked into; straight elements have one of the angle between them
 _KINK, _KINK_STRAIGHT = 0.1, 0.4
@@ -31,8 +33,9 @@ _SMOOTH = 0.2
 _STEADY = 0.1
 #: meridional stress beside a kink, over the median one of the membrane, below which it is the stress that fails and not the mesh
 _WEAK = 0.1
-#: change of the membrane, relative to its size, up to which a state at the same volume is the same one
-_NEAR = 0.2
+#: change of the membrane, relative to its size, up to which a state at the same volume is the same one (few elements let all of a thin pole
+#: be wrong), and one at about that volume
+_NEAR, _CLOSE = 0.7, 0.05
 #: most halvings, and elements beyond which none is halved
 _HALVINGS, _MOST_ELEMENTS = 3, 4096
 
@@ -76,7 +79,7 @@ def _judged_otherwise(potential: Potential, state: State, where: int) -> bool:
     weakest = stress[0].reshape(space.R.shape)[:, beside].min()
     if weakest < _WEAK * np.median(np.abs(stress)) or ill_posed(potential, state.evaluation) is not None:
         return True
-    return bool(unresolved_source(potential, state.x))
+    return any(near < length for near, length in poles_by_sources(potential, state.x))
 
 
 def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str:
@@ -96,7 +99,7 @@ def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str
                 break
         else:
             return f"no such state was found on {onto.space.n_elements} elements"
-        potential, state = onto, State.of(met)
+        potential, state = onto, met
         kink, largest = largest_kink(potential, state.x), _largest_stretch(potential, state.x)
         if kink <= min(_SMOOTH, first / 2) or (tip and kink <= 1.01 * first and abs(largest - before) <= _STEADY):
             return ""
@@ -109,14 +112,25 @@ def largest_kink(potential: Potential, x: Array) -> float:
     return float(potential.space.kinks(x).max(initial=0.0))
 
 
-def _found_again(onto: Potential, potential: Potential, state: State) -> NewtonResult | None:
-    """The state in a finer space: at the same volume and on the same side of its folds, or else across the branch, which has no folds."""
+def _found_again(onto: Potential, potential: Potential, state: State) -> State | None:
+    """The state in a finer space: at the same volume and on the same side of its folds, or near it across the branch, which has no folds."""
+    start = transferred(potential.space, state.x, onto.space)
+
+    def near(found: State, most: float) -> bool:
+        return moved(onto, found.x, start) <= most
+
     result = solved_in(onto, VolumeControl(state.volume), potential, state.x, state.pressure, damped=True)
     if result.status is Status.CONVERGED and _side(onto, result.evaluation) == _side(potential, state.evaluation):
-        if moved(onto, result.x, transferred(potential.space, state.x, onto.space)) <= _NEAR:
-            return result
+        if near(found := State.of(result), _NEAR):
+            return found
     result = met_across(onto, potential, first_point(potential, state, 1))
-    return result if result.status is Status.CONVERGED else None
+    if result.status is not Status.CONVERGED:
+        return None
+    if near(found := State.of(result), _CLOSE):
+        return found
+    with suppress(SolveError):  # where the pole is thin the plane across the branch is met far off
+        found = march(onto, found, VolumeControl, found.volume, state.volume)[-1]
+    return found if near(found, _NEAR) else None
 
 
 def _side(potential: Potential, evaluation: Evaluation) -> int:

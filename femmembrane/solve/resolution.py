@@ -35,7 +35,9 @@ _STEADY = 0.1
 _WEAK = 0.1
 #: change of the membrane, relative to its size, up to which a state at the same volume is the same one (few elements let all of a thin pole
 #: be wrong), and one at about that volume
-_NEAR, _CLOSE = 0.7, 0.05
+_NEAR, _CLOSE = 1.0, 0.05
+#: logarithm of stretches that leave no digits to the finest meshes
+_NO_DIGITS = np.log(1e5)
 #: most halvings, and elements beyond which none is halved
 _HALVINGS, _MOST_ELEMENTS = 3, 4096
 
@@ -87,7 +89,7 @@ def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str
     first = largest_kink(potential, state.x)
     # the tip that a source draws out becomes round on very small elements alone, but its stretches are right long before
     tip = bool(potential.sources) and where >= potential.space.n_elements - 1
-    largest = _largest_stretch(potential, state.x)
+    kink, largest = first, _largest_stretch(potential, state.x)
     for halving in range(_HALVINGS):
         scene, before = potential.scene, largest
         if halving and 2 * scene.mesh.elements > _MOST_ELEMENTS:
@@ -98,7 +100,8 @@ def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str
             if (met := _found_again(onto, potential, state)) is not None:
                 break
         else:
-            return f"no such state was found on {onto.space.n_elements} elements"
+            fading = halving > 0 and kink <= first / 2 and largest > _NO_DIGITS
+            return "" if fading else f"no such state was found on {onto.space.n_elements} elements"
         potential, state = onto, met
         kink, largest = largest_kink(potential, state.x), _largest_stretch(potential, state.x)
         if kink <= min(_SMOOTH, first / 2) or (tip and kink <= 1.01 * first and abs(largest - before) <= _STEADY):
@@ -113,16 +116,16 @@ def largest_kink(potential: Potential, x: Array) -> float:
 
 
 def _found_again(onto: Potential, potential: Potential, state: State) -> State | None:
-    """The state in a finer space: at the same volume and on the same side of its folds, or near it across the branch, which has no folds."""
+    """The state in a finer space: at the same volume and on the same side of its folds, or near it across the branch."""
     start = transferred(potential.space, state.x, onto.space)
 
     def near(found: State, most: float) -> bool:
         return moved(onto, found.x, start) <= most
 
     result = solved_in(onto, VolumeControl(state.volume), potential, state.x, state.pressure, damped=True)
-    if result.status is Status.CONVERGED and _side(onto, result.evaluation) == _side(potential, state.evaluation):
-        if near(found := State.of(result), _NEAR):
-            return found
+    converged = result.status is Status.CONVERGED
+    if converged and _side(onto, result.evaluation) == _side(potential, state.evaluation) and near(found := State.of(result), _NEAR):
+        return found
     result = met_across(onto, potential, first_point(potential, state, 1))
     if result.status is not Status.CONVERGED:
         return None

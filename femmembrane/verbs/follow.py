@@ -223,7 +223,7 @@ def _follow(
         return _follow(on_mesh, control, loads[spread(loads)], begin, solver, False, None, at_limit)
 
     try:
-        scene, start, timings = on_chosen_mesh(scene, start, trial, control)
+        scene, start, timings, shortfall = on_chosen_mesh(scene, start, trial, control)
     except SolveError as error:
         if throw:
             raise
@@ -235,6 +235,9 @@ def _follow(
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
     status, message = Status.CONVERGED, ""
+    if shortfall is not None:
+        status, message = Status.ACCURACY_NOT_MET, str(shortfall)
+        loads = loads[: spread(loads)[shortfall.kept - 1] + 1]
     used = solver if control in _MINIMISED else "newton"
     walk = _Walk(potential, control, _SOLVERS[solver], start)
     if kept is not None:
@@ -444,7 +447,7 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
     clock = time.perf_counter()
     if not isinstance(gas, Gas):
         raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
-    scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
+    scene, start, _, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
     if rests_flat(potential) and gas.pressure(potential.space.reference_volume) == 0:
         return record(scene, potential, flat_state(potential), clock=clock, gas=gas)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from ..threads import one_thread
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume
+
+if TYPE_CHECKING:
+    from ..accuracy.adapt import Shortfall
 
 #: distance to a source at which the membrane counts as touching it
 CONTACT = 1e-3
@@ -83,12 +87,16 @@ def trace(
         carries the branch as ``result``.
     """
     targets = _targets(until)
-    scene, start, timings = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
+    scene, start, timings, shortfall = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
     tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)
     if "center_height" in targets:
         check_height("until.center_height", tracing.potential)
     tracing.timings |= timings
+    if shortfall is not None:
+        tracing.max_steps, targets = shortfall.kept - 1, {}
     status, message = tracing.follow(targets, ill_posed, on_checkpoint)
+    if shortfall is not None:
+        status, message = Status.ACCURACY_NOT_MET, str(shortfall)
     branch = tracing.branch(status, message)
     if throw and message and (until is not None or status is not Status.STEP_LIMIT):
         raise SolveError(message, status=status, result=branch)
@@ -120,10 +128,13 @@ def _on_mesh(
     max_steps: int,
     steps: StepControl | None,
     ill_posed: str,
-) -> tuple[Scene, float | Equilibrium | Branch | None, dict[str, float]]:
-    """The scene with a mesh, the start on it and the seconds that took; a branch that is continued keeps the mesh chosen for it."""
+) -> tuple[Scene, float | Equilibrium | Branch | None, dict[str, float], Shortfall | None]:
+    """The scene with a mesh, the start on it, the seconds that took and where the accuracy ends.
+
+    A branch that is continued keeps the mesh chosen for it.
+    """
     if isinstance(start, Branch) and scene.open and getattr(start.scene.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
-        return scene.replace(mesh=start.scene.mesh, degree=start.scene.degree), start, {}
+        return scene.replace(mesh=start.scene.mesh, degree=start.scene.degree), start, {}, None
 
     def follow(trial: Scene, begin: Equilibrium | None) -> Branch:
         first = start if begin is None else begin
@@ -139,8 +150,8 @@ def _on_mesh(
         )
 
     begin = start if isinstance(start, Equilibrium) else None
-    chosen, begin, timings = on_chosen_mesh(scene, begin, follow, "arc-length")
-    return chosen, start if begin is None else begin, timings
+    chosen, begin, timings, shortfall = on_chosen_mesh(scene, begin, follow, "arc-length")
+    return chosen, start if begin is None else begin, timings, shortfall
 
 
 def trace_iter(

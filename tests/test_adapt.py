@@ -163,7 +163,7 @@ def test_wrinkles_take_more_elements():
 
 
 def true_errors(branch: fm.Branch) -> list[float]:
-    """Of P at some states and the last ones, against four times as many elements of degree 8: at the same volume, height, or across the branch:
+    """Of P at some states, against four times as many elements of degree 8: at the same volume, at the same height, or across the branch:
     the smallest, as each of these is singular at folds of its own."""
     from femmembrane.potential import potential_of
     from femmembrane.solve.continuation import first_point

@@ -27,6 +27,7 @@ class Status(StrEnum):
     NOT_A_MINIMUM = "not a minimum"
     LEGENDRE_FAILURE = "Legendre condition fails"
     SLACK = "slack"
+    NOT_RESOLVED = "not resolved"
     STEP_LIMIT = "step limit"
     UNEXPLAINED_INERTIA = "unexplained change of inertia"
     ACCURACY_NOT_MET = "accuracy not met"
@@ -55,6 +56,8 @@ _ADVICE = {
     Status.ACCURACY_NOT_MET: "ask for less (mesh.accuracy), or give mesh.elements and mesh.degree",
     Status.INTERRUPTED: "what was computed is kept; continue from there",
     Status.CLOSED: "the branch came back to the branch point where it set out: going on would trace it once more",
+    Status.NOT_RESOLVED: "the mesh makes this state: make elements smaller where it says (towards a pole with mesh.ratio or mesh.radii), "
+    "take more of them or a higher degree; a state that finer meshes lose does not exist",
     Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh; "
     "a tension field (effects.tension_field = true) wrinkles instead",
     Status.SLACK: "the tension field ends here: where no tension is left along the meridian the membrane folds onto itself; "

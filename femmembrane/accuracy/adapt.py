@@ -13,7 +13,7 @@ and 1e-10 with degree 2: 32, 110, 326, 988; degree 4: 20, 32, 56, 104; degree 6:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import TYPE_CHECKING, Any, cast
 
@@ -25,8 +25,11 @@ from ..discretization.space import Space, space_of
 from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
+from ..solve.continuation import first_point
 from ..solve.controls import CenterHeightControl, Control, VolumeControl
-from ..solve.finer import solved_in, transferred
+from ..solve.finer import met_across, solved_in, transferred
+from ..solve.resolution import largest_kink
+from ..solve.state import State
 from ..solve.wellposed import ill_posed
 from .error_estimate import finer_space, same_state
 
@@ -38,6 +41,8 @@ Follow = Callable[[Scene], "Branch"]
 
 #: states of the trial run whose errors are estimated
 STATES = 12
+#: meshes that are chosen, at most, until a run is as good as asked for all along
+_ROUNDS = 2
 #: of these, the hardest ones are tried on every mesh
 _TRIED = 4
 #: elements of the trial meshes, tried in turn until errors can be estimated
@@ -82,6 +87,105 @@ def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
     """
     trial = _trial(scene, follow, control)
     return _Choice(scene, trial, _accuracy(scene)).chosen()
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """Where a run leaves the accuracy that its mesh was chosen for: ``kept`` equilibria are as good as asked for, ``error`` is the estimate
+    for the next one, NaN where there is none."""
+
+    kept: int
+    accuracy: float
+    error: float
+    last: str
+
+    def __str__(self) -> str:
+        beyond = "no error can be estimated" if np.isnan(self.error) else f"the error is about {self.error:.1e}"
+        where = f"it is kept up to {self.last}; at the next equilibrium {beyond}" if self.kept else f"at the first equilibrium {beyond}"
+        return f"mesh.accuracy = {self.accuracy:g} is not met all along: {where}"
+
+
+def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene, Shortfall | None]:
+    """As :func:`choose_mesh`, with the errors of the run on the chosen mesh estimated and, where they are too large, the mesh chosen again.
+
+    A few states of a trial do not stand for all of a run: one that ends in a spike below a source becomes harder without end.
+    """
+    controls = _controls(control)
+    trial, found = _trial(scene, follow, control), None
+    for _ in range(_ROUNDS):
+        try:
+            chosen = _Choice(scene, trial, _accuracy(scene)).chosen()
+        except SolveError:
+            if found is not None:
+                break
+            easier = trial.before_the_hardest()
+            if easier is None:
+                raise
+            chosen = _Choice(scene, easier, _accuracy(scene)).chosen()
+        branch = follow(chosen)
+        shortfall = _shortfall(branch, controls, _accuracy(scene))
+        if found is None or shortfall is None or (shortfall.kept > 0 and _farther(branch, shortfall, *found)):
+            found = (branch, shortfall)
+        if shortfall is None:
+            break
+        finer = follow(_on(scene, Disc(radii=cast(Disc, chosen.mesh).radii)))
+        if not len(finer):
+            break
+        trial = _estimated([finer[k] for k in _checked(finer)], controls, chosen.mesh.elements)
+        if not len(trial.errors):
+            break
+    branch, shortfall = cast("tuple[Branch, Shortfall | None]", found)
+    return branch.scene, shortfall
+
+
+def _farther(branch: Branch, shortfall: Shortfall, other: Branch, others: Shortfall | None) -> bool:
+    """Whether more of a run is as good as asked for than of another one."""
+    return others is not None and _way(branch, shortfall.kept) > _way(other, others.kept)
+
+
+def _way(branch: Branch, kept: int) -> float:
+    """Length of a run up to an equilibrium, in the pole's height and the volume."""
+    heights, volumes = (np.array([getattr(eq, name) for eq in branch[:kept]]) for name in ("center_height", "volume"))
+    return float(np.hypot(np.diff(heights), np.diff(volumes)).sum())
+
+
+def _checked(branch: Branch) -> list[int]:
+    """Equilibria of a run whose errors say most: some all along, the extreme ones, and those with the largest kinks."""
+    potential = branch[0].potential
+    kinks = [largest_kink(potential, eq.state) for eq in branch]
+    return sorted({*spread([eq.volume for eq in branch]), *np.argsort(kinks)[-_TRIED:].tolist()})
+
+
+def _shortfall(branch: Branch, controls: tuple[str, ...], accuracy: float) -> Shortfall | None:
+    """Where the accuracy ends; None when it is kept at all equilibria that were looked at."""
+    if not len(branch):
+        return None
+    potential = branch[0].potential
+    scale = _LEAST_PRESSURE * max(abs(eq.pressure) for eq in branch)
+
+    def error(k: int) -> float:
+        eq = branch[k]
+        if eq.status.ill_posed:
+            return 0.0
+        found = relative_error(potential, eq.state, eq.pressure, controls, scale)
+        return _across(potential, eq, scale) if np.isnan(found) and len(controls) > 1 else found
+
+    good = -1
+    for k in _checked(branch):
+        if not error(k) <= accuracy:
+            first = next(i for i in range(good + 1, k + 1) if not error(i) <= accuracy)
+            last = f"V = {branch[first - 1].volume:.6g}, P = {branch[first - 1].pressure:.6g}" if first else ""
+            return Shortfall(first, accuracy, error(first), last)
+        good = k
+    return None
+
+
+def _across(potential: Potential, eq: Equilibrium, scale: float) -> float:
+    """Estimated relative error of P next to folds of volume and height: how far the branch of a finer space is away there."""
+    evaluation = potential.evaluate(eq.state, eq.pressure)
+    state = State(eq.state, eq.pressure, evaluation, 0, 0.0, 0.0, 0.0)
+    met = met_across(potential_of(finer_space(potential, evaluation)[0]), potential, first_point(potential, state, 1))
+    return abs(met.pressure - eq.pressure) / max(abs(eq.pressure), scale) if met.status is Status.CONVERGED else np.nan
 
 
 def graded(s: Array, density: Array, elements: int) -> tuple[float, ...]:
@@ -161,6 +265,11 @@ class _Trial:
     wrinkled: bool
     scale: float
 
+    def before_the_hardest(self) -> _Trial | None:
+        """The trial up to its hardest state; None where that is among the first."""
+        end = int(self.errors.argmax())
+        return replace(self, states=self.states[:end], errors=self.errors[:end]) if end > 1 else None
+
     def density(self) -> tuple[Array, Array]:
         """Points s and the density of elements there that suits all states."""
         space = self.potential.space
@@ -214,10 +323,9 @@ def relative_error(potential: Potential, x: Array, pressure: float, controls: Se
 
 def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
     """The run on the coarsest trial mesh on which its errors can be estimated."""
-    controls = {"height": ("height",), "arc-length": ("volume", "height")}.get(control, ("volume",))
-    trial = None
+    controls, trial = _controls(control), None
     for elements in _TRIAL_MESHES:
-        branch = follow(scene.replace(mesh=Disc(elements), degree=_TRIAL_DEGREE, run=None, analysis=type(scene.analysis)()))
+        branch = follow(_on(scene, Disc(elements)))
         if not len(branch):
             failure = SolveError(branch.message, status=branch.status)
             continue
@@ -230,6 +338,16 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
         message = f"mesh.accuracy = {_accuracy(scene):g}: no error can be estimated at any state of the run, which depend on the mesh"
         raise SolveError(message, status=Status.ACCURACY_NOT_MET)
     return trial
+
+
+def _controls(control: str) -> tuple[str, ...]:
+    """What is held while errors are estimated, for a kind of run."""
+    return {"height": ("height",), "arc-length": ("volume", "height")}.get(control, ("volume",))
+
+
+def _on(scene: Scene, mesh: Disc) -> Scene:
+    """The scene of a trial."""
+    return scene.replace(mesh=mesh, degree=_TRIAL_DEGREE, run=None, analysis=type(scene.analysis)())
 
 
 def _estimated(equilibria: Sequence[Equilibrium], controls: tuple[str, ...], elements: int) -> _Trial:

@@ -20,6 +20,7 @@ from ..solve.banded import negative_directions
 from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
 from ..solve.finer import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
+from ..solve.resolution import unresolved
 from ..solve.state import State
 from ..solve.wellposed import ill_posed
 from ..stability.spectrum import SpectrumError
@@ -129,6 +130,8 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     bad = ill_posed(potential, evaluation)
     if bad is not None:
         return _without(control, values, method, f"not estimated: {bad}, and what a mesh finds depends on the mesh")
+    if lost := unresolved(potential, State(x, pressure, evaluation, 0, 0.0, 0.0, 0.0)):
+        return _without(control, values, method, f"not estimated: {lost}")
     finer = potential_of(scene)
     found, reason = same_state(finer, potential, x, pressure, evaluation, control)
     if found is None:

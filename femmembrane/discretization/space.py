@@ -434,6 +434,47 @@ class Space:
         u_s, w_s = ((lambda both: (both[1, :-1] + both[0, 1:]) / 2)(slope @ c / self.sizes) for c in (u, w))
         return (value @ u)[0, 1:], u_s, (value @ w)[0, 1:], w_s
 
+    def kinks(self, x: Array) -> Array:
+        """Jumps of the deformed meridian's slope, relative to the smaller of both sides: where elements meet, then at the poles.
+
+        The slope is that with respect to arc length at rest, a vector as long as the meridional stretch. At a pole it is compared with its
+        mirror image. What is kinked at rest counts only as far as it is more kinked now.
+
+        Returns
+        -------
+        ndarray, shape (n_elements - 1 + number of poles,)
+            At the reference radii :attr:`kink_radii`.
+        """
+        at_rest, slope, per_length, rest_kinks, poles = self._ends_of_elements
+        local, n = self.extend(x)[self.gather], self.degree + 1
+        y = (slope @ (local[:n] + 1j * local[n:])) * per_length + at_rest
+        size = np.abs(y)
+        jumps = np.empty(rest_kinks.size)
+        inner = self.n_elements - 1
+        np.divide(np.abs(y[1, :-1] - y[0, 1:]), np.minimum(size[1, :-1], size[0, 1:]) + 1e-300, out=jumps[:inner])
+        for k, end in enumerate(poles):
+            jumps[inner + k] = 2 * abs(y[end].imag) / (size[end] + 1e-300)
+        jumps -= rest_kinks
+        return jumps
+
+    @cached_property
+    def kink_radii(self) -> Array:
+        """Reference radii of :meth:`kinks`."""
+        return np.append(self._end_positions[0, 1:-1], np.zeros(int(self.on_axis.sum())))
+
+    @cached_property
+    def _ends_of_elements(self) -> tuple[Array, Array, Array, Array, list[tuple[int, int]]]:
+        """Complex tangents at both ends of each element at rest, slopes of the shape functions there, the factor that relates them to arc
+        length, the kinks at rest and which ends are poles."""
+        inside = 1e-9 * self.sizes  # the tangent of a curve with a corner has two values there
+        R_s, Z_s = self.mesh.tangent(np.stack([self.ends[:-1] + inside, self.ends[1:] - inside]))
+        length = np.hypot(R_s, Z_s)
+        at_rest = (R_s + 1j * Z_s) / length
+        poles = [(k, -k) for k in (0, 1) if self.on_axis[k]]
+        turned = [2 * abs(at_rest[end].imag) for end in poles]
+        rest_kinks = np.append(np.abs(at_rest[1, :-1] - at_rest[0, 1:]), turned)
+        return at_rest, self.shape_functions(np.array([0.0, 1.0]))[1], 1 / (length * self.sizes), rest_kinks, poles
+
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.
 

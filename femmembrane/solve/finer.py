@@ -15,7 +15,7 @@ from ..errors import Status
 from ..potential import Array, Evaluation, Family, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from .banded import band_product
-from .continuation import first_point
+from .continuation import BranchPoint, first_point
 from .controls import ArcLengthControl, Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, relative_residual
 from .state import State, distance
@@ -52,22 +52,22 @@ def solved_in(
     return correct(onto, control, start, pressure, magnetic=magnetic)
 
 
-def solved_past_folds(onto: Potential, control: Control, potential: Potential, state: State) -> NewtonResult:
-    """As :func:`solved_in`, for a state next to a fold of the control: the branch is :func:`met` first, and then followed to it."""
-    result = met(onto, potential, state)
-    if result.status is not Status.CONVERGED:
-        return result
-    return correct(onto, control, result.x, result.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
-
-
-def met(onto: Potential, potential: Potential, state: State) -> NewtonResult:
-    """Where the branch of another space crosses the plane through a state across its tangent: regular at folds of every quantity."""
-    point = first_point(potential, state, 1)
+def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> NewtonResult:
+    """Where the branch of another space crosses the plane through a point of a branch, across its tangent: regular at every fold."""
+    state = point.state
     start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
     dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / (onto.area * onto.space.unit**2)
     across = ArcLengthControl(dual, point.dual_pressure, start, state.pressure)
     factor = state.evaluation.factor
     return correct(onto, across, start, state.pressure, magnetic=factor, damped=True, max_iterations=_MAX_ITERATIONS)
+
+
+def solved_past_folds(onto: Potential, control: Control, potential: Potential, state: State) -> NewtonResult:
+    """As :func:`solved_in`, for a state next to a fold of the control: the branch is :func:`met_across` first, and then followed to it."""
+    result = met_across(onto, potential, first_point(potential, state, 1))
+    if result.status is not Status.CONVERGED:
+        return result
+    return correct(onto, control, result.x, result.pressure, damped=True, max_iterations=_MAX_ITERATIONS)
 
 
 def counterpart(
@@ -81,7 +81,7 @@ def counterpart(
     pressure : float, optional
         Default that which balances the forces best.
     held : {"volume", "pressure"}
-        What is the same in both; where that leads to no state near by, as next to a fold of it, the branch is met as in :func:`met`.
+        What is the same in both; where that leads to no state near by, as next to a fold of it, the branch is met as in :func:`met_across`.
     level : {1, 2}
         1 for the space of :func:`finer_scene`, 2 for one of one degree more again, on elements of half the size: what is of the size of an
         element changes with it.
@@ -109,7 +109,7 @@ def _counterpart(potential: Potential, state: bytes, pressure: float, factor: fl
     tries: tuple[Callable[[], NewtonResult], ...] = (
         lambda: solved_in(finer, control, potential, x, pressure, magnetic=factor),
         lambda: solved_in(finer, control, potential, x, pressure, magnetic=factor, damped=True),
-        lambda: met(finer, potential, State(x, pressure, evaluation, 0, 0.0, 0.0, 0.0)),
+        lambda: met_across(finer, potential, first_point(potential, State(x, pressure, evaluation, 0, 0.0, 0.0, 0.0), 1)),
     )
     start = transferred(potential.space, x, finer.space)
     for attempt in tries:

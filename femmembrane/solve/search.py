@@ -14,6 +14,7 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import Control, PressureControl, VolumeControl
 from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, relative_size
+from .resolution import unresolved
 from .special_points import FOLDS, Located, Segment, branch_points
 from .start import moderate, start_at_volume
 from .state import Path, State, at_rest, distance, flat_state
@@ -50,6 +51,7 @@ class Search:
     deflations: int = 0
     ill_posed: list[State] = field(default_factory=list)
     crossings: list[Crossing] = field(default_factory=list)
+    unresolved: list[State] = field(default_factory=list)
     _points: list[BranchPoint] = field(default_factory=list)
     _halves: list[tuple[Crossing, int]] = field(default_factory=list)
 
@@ -136,16 +138,20 @@ class Search:
         return False
 
     def _add(self, state: State) -> bool:
-        """Keep a state unless it is known; one that is ill-posed is a folded shape of this mesh, remembered only to be avoided."""
+        """Keep a state unless it is known; one that is ill-posed or not resolved is a shape of this mesh, remembered only to be avoided."""
         if self._known(state.x):
             return False
-        well_posed = ill_posed(self.potential, state.evaluation) is None
-        (self.states if well_posed else self.ill_posed).append(state)
-        return well_posed
+        kept = self.states
+        if ill_posed(self.potential, state.evaluation) is not None:
+            kept = self.ill_posed
+        elif unresolved(self.potential, state):
+            kept = self.unresolved
+        kept.append(state)
+        return kept is self.states
 
     @property
     def _avoided(self) -> list[State]:
-        return self.states + self.ill_posed
+        return self.states + self.ill_posed + self.unresolved
 
     def _known(self, x: Array) -> bool:
         return any(distance(self.potential, x, s.x) <= SAME * distance(self.potential, s.x, 0 * s.x) for s in self._avoided)

@@ -122,18 +122,23 @@ def _folds(potential: Potential, x: Array, scale: float) -> Array:
 
 def unresolved_source(potential: Potential, x: Array) -> str:
     """That a source is nearer to the pole than the nodes there are to each other, so that its field is not resolved; empty if none is."""
-    if not potential.sources:
-        return ""
-    space = potential.space
-    for k in (0, -1):
-        if not space.on_axis[k]:
-            continue
-        (_, pole), (rho, eta) = space.end_position(x, k), space.end_position(x, 1 if k == 0 else -2)
-        spacing = math.hypot(rho, eta - pole) / potential.scene.degree
-        near = math.sqrt(min(float(source.distance_squared(0.0, pole)) for source in potential.sources))
-        if near < spacing:
+    for near, length in poles_by_sources(potential, x):
+        if near < (spacing := length / potential.scene.degree):
             return f"the pole is {near:.2g} from a source, where nodes are {spacing:.2g} apart: its field is not resolved"
     return ""
+
+
+def poles_by_sources(potential: Potential, x: Array) -> list[tuple[float, float]]:
+    """For each pole its distance from the nearest source and the length of the element there, deformed; nothing without sources."""
+    if not potential.sources:
+        return []
+    space, found = potential.space, []
+    for k in (0, -1):
+        if space.on_axis[k]:
+            (_, pole), (rho, eta) = space.end_position(x, k), space.end_position(x, 1 if k == 0 else -2)
+            near = math.sqrt(min(float(source.distance_squared(0.0, pole)) for source in potential.sources))
+            found.append((near, math.hypot(rho, eta - pole)))
+    return found
 
 
 def is_slack(potential: Potential, state: State) -> bool:

@@ -16,7 +16,7 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Evaluation, Family, Potential, potential_of
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
-from ..solve import wellposed
+from ..solve import resolution, wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
 from ..solve.parameter import Parameter
@@ -255,6 +255,9 @@ class _Following:
             if beyond:
                 bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
                 new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
+            scene = self.parameter.scene_at(new.number)
+            if unresolved := resolution.unresolved(self.system.family, self._state(new), scene):
+                return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
             self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
             self.add(new)
             if new.number in self.bounds:
@@ -279,8 +282,11 @@ class _Following:
 
     def _record(self, point: FoldPoint) -> Equilibrium:
         potential, evaluation = self._own(point)
-        state = State(point.x, point.pressure, evaluation, point.iterations, point.correction, point.residual, gap=0.0)
-        return record(self.parameter.scene_at(point.number), potential, state)
+        return record(self.parameter.scene_at(point.number), potential, self._state(point, evaluation))
+
+    def _state(self, point: FoldPoint, evaluation: Evaluation | None = None) -> State:
+        known = point.evaluation if evaluation is None else evaluation
+        return State(point.x, point.pressure, known, point.iterations, point.correction, point.residual, gap=0.0)
 
     def _own(self, point: FoldPoint) -> tuple[Potential, Evaluation]:
         """Potential and evaluation of a point: those of its own scene where a finer space must be asked whether a compression is real."""

@@ -20,6 +20,7 @@ from ..scene import MAX_STEPS, Scene
 from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import TOLERANCE, correct
+from ..solve.resolution import refuse_unresolved
 from ..solve.search import Limit, beyond_crossing, beyond_limit, loss_before
 from ..solve.special_points import ON_FOLD
 from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume, start_in_gas
@@ -227,7 +228,7 @@ def _follow(
         return _follow(on_mesh, control, loads[spread(loads)], begin, solver, False, None, at_limit)
 
     try:
-        scene, start, timings = on_chosen_mesh(scene, start, trial, control)
+        scene, start, timings, shortfall = on_chosen_mesh(scene, start, trial, control)
     except SolveError as error:
         if throw:
             raise
@@ -239,6 +240,9 @@ def _follow(
     found: list[Equilibrium] = []
     jumps: list[Jump] = []
     status, message = Status.CONVERGED, ""
+    if shortfall is not None:
+        status, message = Status.ACCURACY_NOT_MET, str(shortfall)
+        loads = loads[: spread(loads)[shortfall.kept - 1] + 1]
     used = solver if control in _MINIMISED else "newton"
     walk = _Walk(potential, control, _SOLVERS[solver], start)
     if kept is not None:
@@ -402,6 +406,7 @@ class _Walk:
         self.state, self.load = state, load
         if unresolved := unresolved_source(self.potential, self.state.x):
             raise SolveError(unresolved, status=Status.DIPOLE_CONTACT)
+        refuse_unresolved(self.potential, state)
         return self.state, turn
 
     def _through_flat(self, before: State, load: float, jump: bool) -> tuple[State, _Turn | None]:
@@ -474,7 +479,7 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
     clock = time.perf_counter()
     if not isinstance(gas, Gas):
         raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
-    scene, start, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
+    scene, start, _, _ = on_chosen_mesh(scene, start, lambda trial, begin: Branch(trial, (_in_gas(trial, gas, begin),)), "volume")
     potential = potential_of(scene)
     if rests_flat(potential) and gas.pressure(potential.space.reference_volume) == 0:
         return record(scene, potential, flat_state(potential), clock=clock, gas=gas)
@@ -489,4 +494,5 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
         )
     if held != gas.amount:
         state = march(potential, state, lambda amount: replace(gas, amount=amount), held, gas.amount)[-1]
+    refuse_unresolved(potential, state)
     return record(scene, potential, state, clock=clock, gas=gas)

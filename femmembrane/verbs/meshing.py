@@ -5,12 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from ..errors import SolveError, Status
 from ..potential import potential_of
 from ..results.records import Branch, Equilibrium
 from ..scene import Scene
 from ..solve.finer import transferred
 from .arguments import check_scene
+
+if TYPE_CHECKING:
+    from ..accuracy.adapt import Shortfall
 
 #: what is wanted, or a part of it, from a scene with a mesh and a start on it
 FollowFrom = Callable[[Scene, Equilibrium | None], Branch]
@@ -18,8 +23,10 @@ FollowFrom = Callable[[Scene, Equilibrium | None], Branch]
 
 def on_chosen_mesh(
     scene: Scene, start: Equilibrium | None, follow: FollowFrom, control: str
-) -> tuple[Scene, Equilibrium | None, dict[str, float]]:
-    """The scene with a mesh, the start on that mesh, and the seconds that the choice took; all as it is unless it is still to be chosen.
+) -> tuple[Scene, Equilibrium | None, dict[str, float], Shortfall | None]:
+    """The scene with a mesh, the start on that mesh, the seconds that the choice took, and where ``follow`` leaves the accuracy on it.
+
+    All is as it is unless the mesh is still to be chosen.
 
     Raises
     ------
@@ -30,12 +37,14 @@ def on_chosen_mesh(
     """
     check_scene(scene)
     if not scene.open:
-        return scene, start, {}
+        return scene, start, {}, None
     clock = time.perf_counter()
-    from ..accuracy.adapt import choose_mesh
+    from ..accuracy.adapt import choose_and_check
 
-    chosen = choose_mesh(scene, lambda trial: follow(trial, _carried(start, trial)), control)
-    return chosen, _carried(start, chosen), {"mesh": time.perf_counter() - clock}
+    chosen, shortfall = choose_and_check(scene, lambda trial: follow(trial, _carried(start, trial)), control)
+    if shortfall is not None and not shortfall.kept:
+        raise SolveError(str(shortfall), status=Status.ACCURACY_NOT_MET)
+    return chosen, _carried(start, chosen), {"mesh": time.perf_counter() - clock}, shortfall
 
 
 def _carried(start: Equilibrium | None, scene: Scene) -> Equilibrium | None:

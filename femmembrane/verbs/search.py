@@ -105,4 +105,5 @@ def _searched(search: Search) -> str:
         parts.append(f"{left} more at which it was not")
     parts.append(f"{search.deflations} deflated solves ({search.iterations} iterations)")
     ill = f"; {len(search.ill_posed)} ill-posed state(s) left out, whose shape depends on the mesh" if search.ill_posed else ""
-    return f"searched: {', '.join(parts)}{ill}"
+    lost = f"; {len(search.unresolved)} state(s) left out that the mesh does not resolve" if search.unresolved else ""
+    return f"searched: {', '.join(parts)}{ill}{lost}"

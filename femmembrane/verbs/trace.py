@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..physics.checks import is_number, number
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
-from ..solve import wellposed
+from ..solve import resolution, wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_points, branches_crossing
 from ..solve.start import CONTACT, moderate, start_at_volume
@@ -22,6 +23,9 @@ from ..threads import one_thread
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
 from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
+
+if TYPE_CHECKING:
+    from ..accuracy.adapt import Shortfall
 
 
 @one_thread
@@ -84,12 +88,16 @@ def trace(
         carries the branch as ``result``.
     """
     targets = _targets(until)
-    scene, start, timings = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
+    scene, start, timings, shortfall = _on_mesh(scene, start, until, direction, max_steps, steps, ill_posed)
     tracing = _begin(scene, start, direction, steps, special_points, on_step, max_steps, ill_posed)
     if "center_height" in targets:
         check_height("until.center_height", tracing.potential)
     tracing.timings |= timings
+    if shortfall is not None:
+        tracing.max_steps, targets = shortfall.kept - 1, {}
     status, message = tracing.follow(targets, ill_posed, on_checkpoint)
+    if shortfall is not None:
+        status, message = Status.ACCURACY_NOT_MET, str(shortfall)
     branch = tracing.branch(status, message)
     if throw and message and (until is not None or status is not Status.STEP_LIMIT):
         raise SolveError(message, status=status, result=branch)
@@ -121,11 +129,14 @@ def _on_mesh(
     max_steps: int,
     steps: StepControl | None,
     ill_posed: str,
-) -> tuple[Scene, float | Equilibrium | SpecialPoint | Branch | None, dict[str, float]]:
-    """The scene with a mesh, the start on it and the seconds that took; a branch that is continued keeps the mesh chosen for it."""
+) -> tuple[Scene, float | Equilibrium | SpecialPoint | Branch | None, dict[str, float], Shortfall | None]:
+    """The scene with a mesh, the start on it, the seconds that took and where the accuracy ends.
+
+    A branch that is continued keeps the mesh chosen for it.
+    """
     kept = start.equilibrium.scene if isinstance(start, SpecialPoint) else start.scene if isinstance(start, Branch) else None
     if kept is not None and scene.open and getattr(kept.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
-        return scene.replace(mesh=kept.mesh, degree=kept.degree), start, {}
+        return scene.replace(mesh=kept.mesh, degree=kept.degree), start, {}, None
 
     def follow(trial: Scene, begin: Equilibrium | None) -> Branch:
         first = start if begin is None else begin
@@ -143,8 +154,8 @@ def _on_mesh(
     if isinstance(start, SpecialPoint) and scene.open:
         raise InputError("start", start.kind, "a special point of a branch of this scene, on the mesh chosen for it, is allowed")
     begin = start if isinstance(start, Equilibrium) else None
-    chosen, begin, timings = on_chosen_mesh(scene, begin, follow, "arc-length")
-    return chosen, start if begin is None else begin, timings
+    chosen, begin, timings, shortfall = on_chosen_mesh(scene, begin, follow, "arc-length")
+    return chosen, start if begin is None else begin, timings, shortfall
 
 
 def trace_iter(
@@ -263,6 +274,7 @@ class _Tracing:
             state = start_at_volume(potential, volume)
         else:
             raise InputError("start", start, "a volume, an Equilibrium, a SpecialPoint or a traced Branch is allowed")
+        resolution.refuse_unresolved(potential, state)
         tracing = cls(scene, potential, first_point(potential, state, direction), tracer, [], special, on_step, max_steps)
         return tracing._begun(clock)
 
@@ -345,6 +357,8 @@ class _Tracing:
         segment = Segment(self.potential, self.point, new, leaving=self.crossing is not None and len(self.found) == 1)
         met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
+        if unresolved := resolution.unresolved(self.potential, (last or new).state):
+            return Status.NOT_RESOLVED, f"at {self._place(last or new)} {unresolved}"
         closing = self._look_for_special_points(segment, last) if self.special is not None else None
         last = closing or last
         self.add(last or new, clock)
@@ -370,9 +384,11 @@ class _Tracing:
         bad = wellposed.ill_posed(self.potential, point.state.evaluation)
         if bad is None:
             return None
+        return bad.status, f"at {self._place(point)} {bad}, and what a mesh finds beyond depends on the mesh"
+
+    def _place(self, point: BranchPoint) -> str:
         height = self.potential.space.center_height(point.state.x)
-        where = f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
-        return bad.status, f"at {where} {bad}, and what a mesh finds beyond depends on the mesh"
+        return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
 
     def add(self, point: BranchPoint, clock: float) -> None:
         solved = time.perf_counter()

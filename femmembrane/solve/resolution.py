@@ -1,0 +1,149 @@
+"""Whether the mesh resolves a state, or makes it.
+
+Equations of a mesh can be solved to round-off by a shape that no membrane has: a needle at the pole, as wide as the elements there, or a
+layer at the rim. Such a state is told by what happens to it on finer meshes. The meridian of a membrane is smooth where elements meet, and
+at a pole it is level; the kinks that a mesh leaves there are errors of its slopes. They are small on ordinary meshes, and looking at them
+costs next to nothing. Where one is large the state is looked for on meshes that are finer and finer. One that is an approximation of
+something loses its kinks there, or at least keeps its stretches (the tip below a dipole takes many halvings to become round). A needle is
+not found again, or grows.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+
+from ..errors import SolveError, Status
+from ..potential import Array, Evaluation, Potential, potential_of
+from ..scene import MAX_DEGREE, Scene
+from .banded import negative_directions
+from .continuation import first_point
+from .controls import VolumeControl
+from .finer import met_across, moved, solved_in, transferred
+from .state import State
+from .stepping import march
+from .wellposed import ill_posed, poles_by_sources
+
+#: relative kink that is looked into; straight elements have one of the angle between them
+_KINK, _KINK_STRAIGHT = 0.1, 0.4
+#: relative kink at which a finer mesh is good enough to believe the state
+_SMOOTH = 0.2
+#: change of the largest logarithmic stretch from mesh to mesh at which the state is the same one
+_STEADY = 0.1
+#: meridional stress beside a kink, over the median one of the membrane, below which it is the stress that fails and not the mesh
+_WEAK = 0.1
+#: change of the membrane, relative to its size, up to which a state at the same volume is the same one (few elements let all of a thin pole
+#: be wrong), and one at about that volume
+_NEAR, _CLOSE = 1.0, 0.05
+#: logarithm of stretches that leave no digits to the finest meshes
+_NO_DIGITS = np.log(1e5)
+#: most halvings, and elements beyond which none is halved
+_HALVINGS, _MOST_ELEMENTS = 3, 4096
+
+
+def unresolved(potential: Potential, state: State, scene: Scene | None = None) -> str:
+    """Why a state is one of its mesh only, in words; empty where nothing speaks against it.
+
+    Parameters
+    ----------
+    potential, state : Potential, State
+    scene : Scene, optional
+        The scene of the state, where it is not that of the potential.
+    """
+    scene = potential.scene if scene is None else scene
+    space = potential.space
+    kinks = space.kinks(state.x)
+    worst = float(kinks.max(initial=0.0))
+    if worst <= (_KINK_STRAIGHT if scene.degree == 1 else _KINK) or not space.n_elements > 1:  # one element is no mesh to judge
+        return ""
+    where = int(kinks.argmax())
+    if _judged_otherwise(potential, state, where):
+        return ""
+    reason = _lost_on_finer_meshes(potential if scene is potential.scene else potential_of(scene), state, where)
+    if not reason:
+        return ""
+    radius = float(space.kink_radii[where])
+    return f"the mesh does not resolve the membrane at r = {radius:.3g}, where its slope jumps by {worst:.0%}: {reason}"
+
+
+def refuse_unresolved(potential: Potential, state: State, scene: Scene | None = None) -> None:
+    """Raise SolveError with status NOT_RESOLVED for a state of its mesh only."""
+    if reason := unresolved(potential, state, scene):
+        raise SolveError(f"{reason} (V = {state.volume:.6g}, P = {state.pressure:.6g})", status=Status.NOT_RESOLVED)
+
+
+def _judged_otherwise(potential: Potential, state: State, where: int) -> bool:
+    """Whether a kink belongs to a state with a verdict of its own: compressed or slack, or almost so there, or too close to a source."""
+    space, stress = potential.space, state.evaluation.stress
+    inner = space.n_elements - 1
+    beside = [where, where + 1] if where < inner else [0 if where == inner and space.on_axis[0] else inner]
+    weakest = stress[0].reshape(space.R.shape)[:, beside].min()
+    if weakest < _WEAK * np.median(np.abs(stress)) or ill_posed(potential, state.evaluation) is not None:
+        return True
+    return any(near < length for near, length in poles_by_sources(potential, state.x))
+
+
+def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str:
+    """What becomes of the state as elements are halved; empty where it is found again and loses its kinks."""
+    first = largest_kink(potential, state.x)
+    # the tip that a source draws out becomes round on very small elements alone, but its stretches are right long before
+    tip = bool(potential.sources) and where >= potential.space.n_elements - 1
+    kink, largest = first, _largest_stretch(potential, state.x)
+    for halving in range(_HALVINGS):
+        scene, before = potential.scene, largest
+        if halving and 2 * scene.mesh.elements > _MOST_ELEMENTS:
+            break
+        finer = scene.replace(mesh=scene.mesh.refined())
+        degrees = [scene.degree] if halving or scene.degree == MAX_DEGREE else [scene.degree + 1, scene.degree]
+        for onto in (potential_of(finer.replace(degree=degree)) for degree in degrees):
+            if (met := _found_again(onto, potential, state)) is not None:
+                break
+        else:
+            fading = halving > 0 and kink <= first / 2 and largest > _NO_DIGITS
+            return "" if fading else f"no such state was found on {onto.space.n_elements} elements"
+        potential, state = onto, met
+        kink, largest = largest_kink(potential, state.x), _largest_stretch(potential, state.x)
+        if kink <= min(_SMOOTH, first / 2) or (tip and kink <= 1.01 * first and abs(largest - before) <= _STEADY):
+            return ""
+    change = f"the largest stretch is {np.exp(largest - before):.2g} times as large as on half as many, and the slope jumps by {kink:.0%}"
+    return f"on {potential.space.n_elements} elements {change}"
+
+
+def largest_kink(potential: Potential, x: Array) -> float:
+    """The largest of :meth:`.Space.kinks`."""
+    return float(potential.space.kinks(x).max(initial=0.0))
+
+
+def _found_again(onto: Potential, potential: Potential, state: State) -> State | None:
+    """The state in a finer space: at the same volume and on the same side of its folds, or near it across the branch."""
+    start = transferred(potential.space, state.x, onto.space)
+
+    def near(found: State, most: float) -> bool:
+        return moved(onto, found.x, start) <= most
+
+    result = solved_in(onto, VolumeControl(state.volume), potential, state.x, state.pressure, damped=True)
+    converged = result.status is Status.CONVERGED
+    if converged and _side(onto, result.evaluation) == _side(potential, state.evaluation) and near(found := State.of(result), _NEAR):
+        return found
+    result = met_across(onto, potential, first_point(potential, state, 1))
+    if result.status is not Status.CONVERGED:
+        return None
+    if near(found := State.of(result), _CLOSE):
+        return found
+    with suppress(SolveError):  # where the pole is thin the plane across the branch is met far off
+        found = march(onto, found, VolumeControl, found.volume, state.volume)[-1]
+    return found if near(found, _NEAR) else None
+
+
+def _side(potential: Potential, evaluation: Evaluation) -> int:
+    """Number of negative directions at constant volume: changes at every fold in the volume."""
+    return negative_directions(evaluation.band, potential.space.half_bandwidth, evaluation.volume_gradient)
+
+
+def _largest_stretch(potential: Potential, x: Array) -> float:
+    """Logarithm of the largest principal stretch at the quadrature points."""
+    space = potential.space
+    u, u_x, _, w_x = space.at_quadrature(x).reshape(4, *space.R.shape)
+    along = np.hypot(space.R_x + u_x, space.Z_x + w_x) / np.hypot(space.R_x, space.Z_x)
+    return float(np.log(max(along.max(), (1 + u / space.R).max())))

@@ -258,7 +258,7 @@ def test_loads_out_of_reach():
     assert (len(branch), branch.status) == (1, fm.Status.NO_EQUILIBRIUM)
     assert branch[0].error_estimate().pressure.relative < 1e-6
     with pytest.raises(fm.SolveError, match=r"pressure -500 was not reached"):
-        fm.pressurize(asking(ABOVE, 1e-6), pressures=[-500.0])
+        fm.pressurize(asking(disc_scene(fm.NeoHookean()), 1e-6), pressures=[-500.0])
 
 
 def test_states_that_depend_on_the_mesh():

@@ -345,4 +345,4 @@ def test_command_beyond_a_limit_point(tmp_path, capfd):
     said = capfd.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
-    assert not list(out.iterdir())
+    assert not out.exists()

@@ -445,7 +445,7 @@ def test_a_map_names_its_axes_and_hatches_what_is_no_value(tmp_path):
     texts = {t.get_text() for t in legend.get_texts()}
     assert all(any(text.startswith(status) for text in texts) for status in statuses)
     assert (tmp_path / "map.png").stat().st_size > 10_000
-    for show in (["limit_presure.0"], ["limit_pressure"], ["limit_pressure.0"], ["steps.0"], ["status"]):
+    for show in (["limit_presure.0"], ["limit_pressure"], ["limit_pressure.1"], ["steps.0"], ["status"]):
         with pytest.raises(InputError):
             found.plot(show=show)
 

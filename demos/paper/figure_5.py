@@ -89,7 +89,7 @@ def check(below: dict[float, fm.Branch], rest: fm.Branch, least: dict[float, flo
     folds = [p for p in points if p.kind == "volume_fold"][:2]
     np.testing.assert_allclose([p.center_height for p in folds], [0.20753, 0.06665], atol=1e-5)
     assert below[-3.25].status is rest.status is fm.Status.LEGENDRE_FAILURE
-    assert 0.32 < below[-3.25][-1].center_height < 0.34
+    assert 0.31 < below[-3.25][-1].center_height < 0.34
     assert 0.22 < rest[-1].center_height < 0.24
     assert least[-3.75] < -0.2
     assert min(least[-3.5], least[-3.25]) > 0.05

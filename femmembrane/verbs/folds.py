@@ -256,7 +256,8 @@ class _Following:
                 bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
                 new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
             scene = self.parameter.scene_at(new.number)
-            if unresolved := resolution.unresolved(self.system.family, self._state(new), scene):
+            unresolved = ill_posed == "stop" and resolution.unresolved(self.system.family, self._state(new), scene)
+            if unresolved:
                 return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
             self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
             self.add(new)

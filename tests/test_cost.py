@@ -259,7 +259,7 @@ def test_the_flat_membrane_has_no_step_before_it():
 
 def test_a_reference_that_is_not_found():
     """A neo-Hookean membrane holds no pressure above its limit point, 1.9 or so: nothing could be measured."""
-    with pytest.raises(fm.SolveError, match="no equilibrium was found at P = .* that is stable"):
+    with pytest.raises(fm.SolveError, match=r"no equilibrium was found at P = .* that is stable"):
         study(disc_scene(fm.NeoHookean(), elements=4), pressure=9.0)
 
 

@@ -20,10 +20,10 @@ from ..scene import MAX_DEGREE, Scene
 from .banded import negative_directions
 from .continuation import first_point
 from .controls import VolumeControl
-from .finer import met_across, moved, solved_in, transferred
+from .finer import counterpart, met_across, moved, solved_in, transferred
 from .state import State
 from .stepping import march
-from .wellposed import ill_posed, poles_by_sources
+from .wellposed import apparent, ill_posed, poles_by_sources
 
 #: relative kink that is looked into; straight elements have one of the angle between them
 _KINK, _KINK_STRAIGHT = 0.1, 0.4
@@ -36,6 +36,8 @@ _WEAK = 0.1
 #: change of the membrane, relative to its size, up to which a state at the same volume is the same one (few elements let all of a thin pole
 #: be wrong), and one at about that volume
 _NEAR, _CLOSE = 1.0, 0.05
+#: relative change of the pressure in a finer space that a layer of compression may make which is the mesh's alone
+_LAYER = 0.02
 #: logarithm of stretches that leave no digits to the finest meshes
 _NO_DIGITS = np.log(1e5)
 #: most halvings, and elements beyond which none is halved
@@ -53,6 +55,8 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
     """
     scene = potential.scene if scene is None else scene
     space = potential.space
+    if reason := _compressed_on_this_mesh(potential, state):
+        return reason
     kinks = space.kinks(state.x)
     worst = float(kinks.max(initial=0.0))
     if worst <= (_KINK_STRAIGHT if scene.degree == 1 else _KINK) or not space.n_elements > 1:  # one element is no mesh to judge
@@ -65,6 +69,24 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
         return ""
     radius = float(space.kink_radii[where])
     return f"the mesh does not resolve the membrane at r = {radius:.3g}, where its slope jumps by {worst:.0%}: {reason}"
+
+
+def _compressed_on_this_mesh(potential: Potential, state: State) -> str:
+    """Why a state is not resolved that is compressed on this mesh alone, in a layer that changes its pressure; empty for others."""
+    bad = apparent(potential, state.evaluation)
+    if bad is None or ill_posed(potential, state.evaluation) is not None:
+        return ""
+    found = counterpart(potential, state.evaluation, state.pressure)
+    if found is None:
+        return ""
+    change = abs(found.pressure - state.pressure)
+    if change <= _LAYER * max(abs(found.pressure), abs(state.pressure)):
+        return ""
+    on = found.evaluation.potential.space
+    return (
+        f"the mesh does not resolve the membrane at {bad.where}, where its stress is compressive on this mesh alone: P is "
+        f"{found.pressure:.6g} on {on.n_elements} elements of degree {on.degree}"
+    )
 
 
 def refuse_unresolved(potential: Potential, state: State, scene: Scene | None = None) -> None:

@@ -39,7 +39,7 @@ def test_script(script: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
 
 
 def test_gallery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Every figure of the paper, each with its own checks, on one page that needs nothing beside it; demos/paper/README.md has what it finds."""
+    """Every figure of the paper, each with its own checks, on one page that needs nothing beside it, and the table of demos/paper."""
     monkeypatch.syspath_prepend(str(DEMOS / "paper"))
     gallery = importlib.import_module("gallery")
     readme = tmp_path / "README.md"

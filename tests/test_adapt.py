@@ -262,7 +262,7 @@ def test_loads_out_of_reach():
 
 
 def test_states_that_depend_on_the_mesh():
-    """M = 600, h = -3.25 below a pole height of 0.32 is compressed along the meridian (README): nothing to be accurate about."""
+    """M = 600, h = -3.25 below a pole height of 0.32 is compressed along the meridian (demos/wrinkles.md): nothing to be accurate about."""
     scene = asking(disc_scene(OGDEN, (600, -3.25)), 1e-6)
 
     def compressed(trial):

@@ -100,7 +100,7 @@ def test_the_floor_of_a_rough_problem_is_high():
     start = fm.equilibrium(scene, center_height=0.5)
     found = fm.convergence(scene, center_height=-0.1, degrees=(2,), elements=(16, 32), start=start)
     assert found.floors["pressure"] > 1e-9
-    # 2.464635 in the table of the README
+    # 2.464635 in the table of demos/wrinkles.md
     assert found.reference["pressure"] == pytest.approx(2.464635, abs=max(5e-7, 10 * found.floors["pressure"] * 2.5))
 
 

@@ -39,11 +39,11 @@ def test_script(script: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
 
 
 def test_gallery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Every figure of the paper, each with its own checks, on one page that needs nothing beside it; the README has what it finds."""
+    """Every figure of the paper, each with its own checks, on one page that needs nothing beside it, and the table of demos/paper."""
     monkeypatch.syspath_prepend(str(DEMOS / "paper"))
     gallery = importlib.import_module("gallery")
     readme = tmp_path / "README.md"
-    current = (DEMOS.parent / "README.md").read_text(encoding="utf-8")
+    current = (DEMOS / "paper" / "README.md").read_text(encoding="utf-8")
     readme.write_text(current, encoding="utf-8")
     gallery.main(["--out", str(tmp_path / "out"), "--readme", str(readme)])
     assert capsys.readouterr().err == ""

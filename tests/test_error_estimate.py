@@ -224,7 +224,7 @@ def test_taut_tension_field_is_estimated_like_the_plain_membrane():
 
 @pytest.mark.parametrize(("tension_field", "word"), [(False, "compressive"), (True, "slack")])
 def test_where_states_depend_on_the_mesh_there_is_no_estimate(tension_field, word):
-    """M = 600, h = -3.25: compressed along the meridian at pole heights 0.24 to 0.32, as a tension field slack at 0.337 (README)."""
+    """M = 600, h = -3.25: compressed along the meridian at pole heights 0.24 to 0.32, slack at 0.337 as a tension field."""
     scene = disc_scene(OGDEN, (600, -3.25)).replace(tension_field=tension_field)
     branch = fm.trace(scene, start=2.0, until={"center_height": 0.2}, direction=-1)
     assert branch.status.ill_posed

@@ -624,7 +624,7 @@ def test_a_torus_has_no_first_node() -> None:
 
 
 def test_a_shape_costs_what_it_uses() -> None:
-    """Operations at a point: the disc as before any other shape (243 and 340, the README's table); no walls without a wall."""
+    """Operations at a point: the disc as before any other shape (243 and 340, the table of demos/costs.md); no walls without a wall."""
     assert potential_of(disc_scene()).operations == 243
     assert potential_of(disc_scene(dipole=(200, 6.5))).operations == 340
     ring, hub = (potential_of(disc_scene().replace(mesh=fm.cylinder(2, top=word))) for word in ("axial", "hub"))

@@ -31,7 +31,7 @@ from femmembrane.results.store import replace_file
 
 FIGURES = {3: figure_3, 4: figure_4, 5: figure_5, 6: figure_6, 7: figure_7, 8: figure_8, 9: figure_9, 10: figure_10}
 #: what the short table stands between
-MARKERS = ("<!-- gallery: python demos/paper/gallery.py --readme README.md -->", "<!-- end of gallery -->")
+MARKERS = ("<!-- gallery: python demos/paper/gallery.py --readme demos/paper/README.md -->", "<!-- end of gallery -->")
 STYLE = """
 body { font: 16px/1.5 sans-serif; max-width: 62em; margin: 2em auto; padding: 0 1em; color: #222 }
 img { max-width: 100%; display: block; margin: 1em 0 }
@@ -51,7 +51,7 @@ explains). In words on stability, "at held V only" is stable among axisymmetric 
 
 
 def short(rows: Iterable[Row]) -> str:
-    """The rows of the project's README as a Markdown table."""
+    """The rows of demos/paper/README.md as a Markdown table."""
     lines = [f"| {' | '.join(HEADER)} |", "|---|---|---:|---:|---:|---:|"]
     return "\n".join([*lines, *(f"| {' | '.join(row.cells())} |" for row in rows if row.shown)])
 

@@ -51,7 +51,7 @@ class Row:
     as_printed : float, optional
         The number by the paper's equations (60) as they are printed, see :mod:`printed_equations`.
     shown : bool
-        Also in the short table of the project's README.
+        Also in the short table of README.md beside this file.
     """
 
     figure: str

@@ -1,4 +1,4 @@
-"""The table of the README, made by running every case.
+"""The table of README.md in this folder, made by running every case.
 
 python -m tests.hard_cases               print it
 python -m tests.hard_cases --write       put it into the README

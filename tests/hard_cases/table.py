@@ -1,4 +1,4 @@
-"""The table of hard cases in the README: how it is printed, and how it is compared with what comes out now."""
+"""The table of hard cases in README.md beside this file: how it is printed, and how it is compared with what comes out now."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .registry import Case, Outcome
 
-README = Path(__file__).parents[2] / "README.md"
+README = Path(__file__).with_name("README.md")
 BEGIN, END = "<!-- hard cases: printed by python -m tests.hard_cases --write -->", "<!-- end of hard cases -->"
 HEADING = "| case | why it is hard | must come out | came out | s |\n|---|---|---|---|---:|"
 

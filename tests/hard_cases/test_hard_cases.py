@@ -1,4 +1,4 @@
-"""Every hard case ends as its registry says; the README lists them all."""
+"""Every hard case ends as its registry says; README.md in this folder lists them all."""
 
 from __future__ import annotations
 

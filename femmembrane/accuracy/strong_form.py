@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import convert, is_number, number
 from ..discretization.meridian import Disc
 from ..errors import InputError
-from ..physics.checks import convert, is_number, number
 from ..physics.loads import over_projection, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density
 from ..scene import Scene

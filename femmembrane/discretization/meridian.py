@@ -25,8 +25,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import is_number
 from ..errors import InputError
-from ..physics.checks import is_number
 from .supports import Support
 
 Array = NDArray[np.float64]

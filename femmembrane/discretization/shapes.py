@@ -29,8 +29,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..checks import as_float
 from ..errors import InputError
-from ..physics.checks import as_float
 from .meridian import ELEMENTS, Array, check_elements, check_ratio, geometric_ends, graded_alike
 from .supports import POLE, SUPPORTS, Support, check_support
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import as_float, convert
 from ..errors import InputError
-from .checks import as_float, convert
 from .outline import Outline
 
 Array = NDArray[np.float64]

@@ -25,8 +25,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import as_float, is_number
 from ..errors import InputError, unknown_name
-from .checks import as_float, is_number
 from .magnetics import Dipole
 
 #: SI unit of every quantity

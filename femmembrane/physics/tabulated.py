@@ -19,8 +19,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import LARGEST, as_float
 from ..errors import InputError
-from .checks import LARGEST, as_float
 from .magnetics import Source, check_source
 
 _MAX_DEGREE = 40

@@ -11,8 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
+from ..checks import convert
 from ..discretization.space import Space
-from ..physics.checks import convert
 from ..potential import Array, Evaluation
 
 

@@ -16,10 +16,10 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Evaluation, Family, Potential, potential_of
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
+from ..scene.variation import Parameter
 from ..solve import resolution, wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
-from ..solve.parameter import Parameter
 from ..solve.start import CONTACT
 from ..solve.state import State
 from ..threads import one_thread

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy.adapt import spread
+from ..checks import LARGEST, number
 from ..errors import InputError, SolveError, Status, unknown_name
-from ..physics.checks import LARGEST, number
 from ..potential import Array, Potential, potential_of
 from ..results.checkpoint import same_scene
 from ..results.records import Branch, Equilibrium, Jump, PathMemory, SoFar, SpecialPoint

@@ -10,8 +10,8 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import brentq
 
+from ..checks import number
 from ..errors import FemmembraneError, InputError, SolveError, Status, unknown_name
-from ..physics.checks import number
 from ..results.records import Branch, Equilibrium, SpecialPoint
 from ..scene import Analysis, Scene
 from .follow import equilibrium, run

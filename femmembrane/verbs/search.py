@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..checks import number
 from ..errors import InputError
-from ..physics.checks import number
 from ..potential import potential_of
 from ..results.records import Equilibrium
 from ..scene import Scene

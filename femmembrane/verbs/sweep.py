@@ -23,8 +23,8 @@ from ..results.grid import MEANING, dataset_of, load_dataset, save_dataset
 from ..results.kept import Kept
 from ..results.store import scene_text
 from ..scene import Scene
+from ..scene.keys import MAX_SCENES, set_key
 from . import pool
-from .keys import MAX_SCENES, set_key
 from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
 
 if TYPE_CHECKING:

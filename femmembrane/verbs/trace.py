@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from ..checks import is_number, number
 from ..errors import InputError, SolveError, Status, unknown_name
-from ..physics.checks import is_number, number
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene

@@ -13,7 +13,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..errors import InputError, Status, unknown_name
+from ..checks import choice
+from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.banded import negative_directions
@@ -120,10 +121,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     InputError
         For an unknown control.
     """
-    if not isinstance(control, str):
-        raise InputError("control", control, "a name is allowed")
-    if control not in CONTROLS:
-        raise unknown_name("control", control, CONTROLS)
+    choice("control", control, CONTROLS)
     evaluation = potential.evaluate(x, pressure)
     values = _numbers(potential, x, pressure, evaluation, verdicts)
     scene, method = finer_space(potential, evaluation)

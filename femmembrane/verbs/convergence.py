@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, HEADINGS, PROFILES, ROUND_OFF, Convergence, profile_norms
-from ..errors import InputError, SolveError, Status
+from ..checks import only, switch
+from ..errors import SolveError, Status
 from ..potential import Array, potential_of
 from ..results.records import Equilibrium
 from ..scene import MAX_DEGREE, Scene
@@ -74,13 +75,9 @@ def convergence(
     check_scene(scene)
     degrees = check_increasing("degrees", degrees, MAX_DEGREE)
     elements = check_increasing("elements", elements, None)
-    if not isinstance(limit_points, bool):
-        raise InputError("limit_points", limit_points, "True or False is allowed")
-    asked = {"volume": volume, "pressure": pressure, "center_height": center_height}
-    given = {name: value for name, value in asked.items() if value is not None}
-    if len(given) != 1:
-        raise InputError("convergence", sorted(given), "exactly one of volume, pressure and center_height is allowed")
-    ((name, load),) = given.items()
+    switch("limit_points", limit_points, "True or False is allowed")
+    given = {"volume": volume, "pressure": pressure, "center_height": center_height}
+    name, load = only("convergence", given, "exactly one of volume, pressure and center_height is allowed")
     plain = scene.replace(run=None, analysis=type(scene.analysis)())
     found = equilibrium(plain, volume=volume, pressure=pressure, center_height=center_height, start=start, solver="newton")
     control = _CONTROLS[name](float(load))

@@ -19,6 +19,7 @@ import numpy as np
 from ..accuracy import cost as work
 from ..accuracy.cost import Course, Job, Measurement, Outcome, Reference
 from ..accuracy.strong_form import StrongForm, prescribed
+from ..checks import is_number, is_whole
 from ..errors import InputError, SolveError, unknown_name
 from ..native import native
 from ..potential import Potential, potential_of
@@ -218,7 +219,7 @@ def cost(
     _known("starts", starts, work.STARTS)
     _known("methods", methods or (), work.METHODS)
     for key, value, least in (("budget", budget, 0.0), ("step", 1.0 if step is None else step, np.nextafter(0, 1))):
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not least <= value < np.inf:
+        if not (is_number(value) and value >= least):
             raise InputError(key, value, f"a finite number {'>' if key == 'step' else '>='} 0 is allowed")
     if methods is None:
         methods = tuple(work.METHODS) if _has_strong_form(scene) else ()
@@ -272,7 +273,7 @@ def machine() -> dict[str, str]:
 def _whole(key: str, values: Sequence[int], most: int | None = None) -> None:
     numbers: list[Any] = list(values) if isinstance(values, Iterable) and not isinstance(values, (str, bytes)) else []
     for n in numbers or [None]:
-        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1 or (most is not None and n > most):
+        if not is_whole(n, most=most):
             raise InputError(key, n if numbers else values, f"whole numbers {'>= 1' if most is None else f'from 1 to {most}'} are allowed")
 
 

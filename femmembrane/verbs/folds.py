@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Evaluation, Family, Potential, potential_of
 from ..results.records import Equilibrium, SpecialPoint
@@ -340,8 +341,7 @@ def _frozen(column: list[float]) -> Array:
 
 
 def _bounds(parameter: Parameter, bounds: tuple[float, float], direction: int) -> tuple[float, float]:
-    if isinstance(direction, bool) or direction not in (1, -1):
-        raise InputError("direction", direction, "1 (towards larger values) or -1 is allowed")
+    direction = sign("direction", direction, "1 (towards larger values) or -1 is allowed")
     try:
         low, high = (float(b) for b in bounds)
     except (TypeError, ValueError, OverflowError):

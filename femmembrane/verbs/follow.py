@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy.adapt import spread
-from ..checks import LARGEST, number
-from ..errors import InputError, SolveError, Status, unknown_name
+from ..checks import LARGEST, choice, number
+from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.checkpoint import same_scene
 from ..results.records import Branch, Equilibrium, Jump, PathMemory, SoFar, SpecialPoint
@@ -219,10 +219,8 @@ def _follow(
     on_checkpoint: OnCheckpoint | None = None,
     kept: Branch | None = None,
 ) -> Branch:
-    if solver not in _SOLVERS:
-        raise unknown_name("solver", solver, _SOLVERS)
-    if at_limit not in AT_LIMIT:
-        raise unknown_name("at_limit", str(at_limit), AT_LIMIT)
+    choice("solver", solver, _SOLVERS)
+    choice("at_limit", at_limit, AT_LIMIT)
 
     def trial(on_mesh: Scene, begin: Equilibrium | None) -> Branch:
         return _follow(on_mesh, control, loads[spread(loads)], begin, solver, False, None, at_limit)

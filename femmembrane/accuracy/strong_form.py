@@ -251,7 +251,7 @@ class Solution:
 
 
 #: what may be prescribed, as the position of its number in (center_height, stretch, pressure); a volume is none of them
-CONTROLS: Mapping[str, int | None] = {"center_height": 0, "pressure": 2, "volume": None}
+POLE_UNKNOWN: Mapping[str, int | None] = {"center_height": 0, "pressure": 2, "volume": None}
 
 
 def prescribed(volume: float | None, pressure: float | None, center_height: float | None) -> tuple[str, float]:

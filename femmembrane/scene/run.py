@@ -12,11 +12,15 @@ from numpy.typing import NDArray
 from ..checks import choice, number, sequence, sign, store, whole
 from ..errors import InputError
 
-CONTROLS = ("volume", "pressure", "height", "arc-length")
+#: words of [run].control and the quantity that each prescribes, by its public name; arc length prescribes none
+PRESCRIBED = {"volume": "volume", "pressure": "pressure", "height": "center_height"}
+CONTROLS = (*PRESCRIBED, "arc-length")
+#: quantities that a minimiser can hold; the height of the pole is held by no potential
+MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
 #: quantities in which an arc-length run may end
-QUANTITIES = ("volume", "pressure", "center_height")
+QUANTITIES = tuple(PRESCRIBED.values())
 #: equilibria of a run, which has to keep them all
 MAX_STEPS = 10**6
 _MAX_STEPS = 400
@@ -103,6 +107,16 @@ class Run:
             until=None if self.until is None else _target("run.until", self.until),
             max_steps=whole("run.max_steps", self.max_steps, most=MAX_STEPS),
         )
+
+    @property
+    def quantity(self) -> str | None:
+        """Public name of the quantity that is prescribed: volume, pressure or center_height; None with arc length."""
+        return PRESCRIBED.get(self.control)
+
+    @property
+    def minimised(self) -> bool:
+        """Whether the equilibria are found by minimisation (IPOPT)."""
+        return self.solver == "ipopt" and self.quantity in MINIMISED
 
     def loads(self) -> NDArray[np.float64]:
         """The prescribed volumes or pressures, shape (number of equilibria,)."""

@@ -124,7 +124,7 @@ class Scene:
             return
         count, degree = self.mesh.elements, self.degree
         run = self.run
-        minimised = run is not None and run.solver == "ipopt" and run.control in ("volume", "pressure")
+        minimised = run is not None and run.minimised
         each = degree * (_BYTES_MINIMISED if minimised else _BYTES)
         if count * each > SMALL:
             require("mesh.elements", count, each, f"elements of degree {degree}")

@@ -22,15 +22,15 @@ from ..accuracy.strong_form import StrongForm, prescribed
 from ..checks import is_number, is_whole
 from ..errors import InputError, SolveError, unknown_name
 from ..native import native
-from ..potential import Potential, potential_of
+from ..potential import potential_of
 from ..results.origin import NOTED_VERSIONS, processor
 from ..results.records import Branch, Equilibrium
 from ..results.store import package_version, replace_file, save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene
 from ..solve.banded import BandFactor, BorderedFactor
-from ..solve.start import start_at_height, start_at_pressure, start_at_volume
-from ..solve.state import State
+from ..solve.controls import CONTROLS, control_kind
+from ..solve.start import cold_start
 from ..stability.judge import judge
 from ..stability.zones import find_zones
 from ..threads import one_thread
@@ -56,7 +56,6 @@ QUICK: Mapping[str, Any] = {
     "budget": 0.2,
     "reference_elements": 32,
 }
-_SYMBOLS = {"volume": "V", "pressure": "P", "center_height": "pole height"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +225,7 @@ def cost(
     elif methods:
         StrongForm(scene)  # says why not
     _known("tolerances", [m for m in methods if m not in tolerances], ())
-    if control == "center_height":
+    if not CONTROLS[control].minimised:
         solvers = [s for s in solvers if s != "ipopt"]
     course = Course(scene, control, load, step, max(reference_elements, *elements))
     if "ipopt" in solvers and len(degrees) * len(elements) > work.most_meshes():
@@ -255,7 +254,7 @@ def asked_load(scene: Scene) -> dict[str, Any]:
         raise InputError("run", None, "missing; the load that is studied is the last one of [run]")
     if scene.run.control == "arc-length":
         return dict(scene.run.until or {})
-    return {{"height": "center_height"}.get(scene.run.control, scene.run.control): float(scene.run.loads()[-1])}
+    return {control_kind(scene.run.control).name: float(scene.run.loads()[-1])}
 
 
 def machine() -> dict[str, str]:
@@ -370,13 +369,8 @@ def _effects(course: Course) -> list[Job]:
 
 def _recorded(course: Course, scene: Scene) -> Callable[[], Outcome]:
     potential = potential_of(scene)
-    cold: dict[str, Callable[[Potential, float], State]] = {
-        "volume": start_at_volume,
-        "pressure": start_at_pressure,
-        "center_height": start_at_height,
-    }
     try:
-        again = course.step(potential, cold[course.control](potential, course.loads[0]))
+        again = course.step(potential, cold_start(potential, course.control, course.loads[0]))
         previous = record(scene, potential, again("newton", potential))  # lends its modes as the state before does on a branch
     except SolveError as error:
         message = str(error)
@@ -406,7 +400,7 @@ def _number(value: Any, form: str, width: int) -> str:
 def _text(study: Cost) -> Iterator[str]:
     letter = "V" if study.quantity == "volume" else "P"
     reference = study.reference
-    at = f"{_SYMBOLS[study.control]} = {study.load:.9g}"
+    at = f"{CONTROLS[study.control].symbol} = {study.load:.9g}"
     yield f"One equilibrium at {at}: relative error in {letter} and milliseconds (* nothing is better in both)"
     yield (
         f"reference: {letter} = {reference.value:.15g}, {reference.elements} elements of degree {reference.degree}, "

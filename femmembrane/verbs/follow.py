@@ -97,6 +97,23 @@ def pressurize(
     """Follow the membrane through given pressures P = p R0/(mu T), in the order given; otherwise as :func:`inflate`.
 
     Without ``start`` the first state is the first stable equilibrium met on the branch through the moderately inflated membrane.
+
+    Parameters
+    ----------
+    scene : Scene
+    pressures : array_like
+        Pressures P = p R0/(mu T), signed.
+    start, solver, at_limit, throw, on_step
+        As in :func:`inflate`.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter carries the branch up to the failure as ``result``.
     """
     return _follow(scene, "pressure", _loads("pressures", pressures), start, solver, throw, on_step, at_limit)
 
@@ -117,6 +134,26 @@ def equilibrium(
     Exactly one of ``volume``, ``pressure``, ``center_height`` and ``gas`` is given. Under volume and pressure control the state is a
     minimum (``solver="ipopt"``), or any solution of the equations (``"newton"``). The other two always take the Newton corrector:
     a height is held by no potential, and with a gas the branch is followed as the gas is let in.
+
+    Parameters
+    ----------
+    scene : Scene
+    volume : float, optional
+        Enclosed volume over R0^3 (with the 2 pi), signed.
+    pressure : float, optional
+        P = p R0/(mu T).
+    center_height : float, optional
+        Height over R0 of the pole, or of the first point of a meridian without a pole.
+    gas : Gas, optional
+        Amount of gas behind the membrane.
+    start : Equilibrium, optional
+        A neighbour to start from; default: a cold start from the moderately inflated membrane.
+    solver : {"ipopt", "newton"}
+        Minimiser, or the bordered corrector (which also finds saddle points).
+
+    Returns
+    -------
+    Equilibrium
 
     Raises
     ------

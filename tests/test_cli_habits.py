@@ -31,7 +31,7 @@ def test_a_scene_is_run_by_its_name(tmp_path: Path, capsys: pytest.CaptureFixtur
     folder = tmp_path / "share" / "femmembrane" / "scenes"
     folder.mkdir(parents=True)
     (folder / "small.toml").write_text('[material]\nmodel = "neo-hookean"\n[mesh]\nelements = 4\n[run]\nvalues = [1.0]\n', encoding="utf-8")
-    files = [metadata.PackagePath(name) for name in ("femmembrane/scene.py", "../share/femmembrane/scenes/small.toml")]
+    files = [metadata.PackagePath(name) for name in ("femmembrane/scene/value.py", "../share/femmembrane/scenes/small.toml")]
     for file in files:
         file.dist = SimpleNamespace(locate_file=lambda path: tmp_path / "lib" / path)
     monkeypatch.setattr(metadata, "files", lambda name: files)

@@ -10,10 +10,10 @@ from femmembrane.accuracy.collocation import collocate
 from femmembrane.accuracy.shooting import shoot
 from femmembrane.accuracy.strong_form import Guess
 from femmembrane.potential import Family, Potential, potential_of
+from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.banded import band_product
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.minimize import nlp_functions
-from femmembrane.solve.parameter import Parameter, names
 from femmembrane.stability.azimuthal import azimuthal_operator
 
 from .cases import OGDEN, disc_scene

@@ -17,7 +17,7 @@ from femmembrane.errors import InputError
 from femmembrane.physics.scales import UNITS
 from femmembrane.potential import potential_of
 from femmembrane.results import table
-from femmembrane.solve.parameter import Parameter
+from femmembrane.scene.variation import Parameter
 from femmembrane.views import picture
 
 from .cases import OGDEN, disc_scene

@@ -17,9 +17,9 @@ from femmembrane.discretization.space import Space
 from femmembrane.discretization.supports import SUPPORTS, free_rotations
 from femmembrane.errors import Status
 from femmembrane.potential import Family, Potential, potential_of
+from femmembrane.scene.variation import Parameter
 from femmembrane.solve.banded import band_product
 from femmembrane.solve.guess import guess_at_volume
-from femmembrane.solve.parameter import Parameter
 from femmembrane.stability.azimuthal import azimuthal_operator
 
 from .cases import OGDEN, SUSCEPTIBILITY, disc_scene

@@ -12,12 +12,12 @@ import pytest
 
 import femmembrane as fm
 from femmembrane import memory
+from femmembrane.checks import LARGEST, number
 from femmembrane.cli import main
 from femmembrane.errors import FemmembraneError, InputError
-from femmembrane.physics.checks import LARGEST, number
 from femmembrane.scene import MAX_STEPS, MAX_TEXT, MAX_WAVES, Scene, read_tables
+from femmembrane.scene.keys import MAX_SCENES, set_key, values_of
 from femmembrane.verbs.arguments import check_max_steps
-from femmembrane.verbs.keys import MAX_SCENES, set_key, values_of
 from femmembrane.verbs.sweep import plan_sweep
 
 from .cases import disc_scene

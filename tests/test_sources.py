@@ -14,10 +14,10 @@ from femmembrane.accuracy.strong_form import Guess
 from femmembrane.physics.magnetics import distance_to_polyline, magnetic_energy_density, magnetic_field, swept
 from femmembrane.physics.sources import loop_field
 from femmembrane.potential import Family, Potential, _casadi_answers_numpy, potential_of
+from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.controls import PressureControl
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.newton import correct
-from femmembrane.solve.parameter import Parameter, names
 from femmembrane.stability.azimuthal import azimuthal_operator
 from femmembrane.stability.profile import profile_at
 from femmembrane.views import plots

@@ -20,8 +20,8 @@ import femmembrane as fm
 from femmembrane.cli import main
 from femmembrane.errors import InputError
 from femmembrane.results.kept import Kept
+from femmembrane.scene.keys import set_all, set_key, values_of
 from femmembrane.verbs import pool
-from femmembrane.verbs.keys import set_all, set_key, values_of
 from femmembrane.verbs.quantities import QUANTITIES, UNEXPECTED, Options, Row, compute
 from femmembrane.verbs.sweep import KEPT
 

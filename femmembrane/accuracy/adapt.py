@@ -26,7 +26,7 @@ from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.continuation import first_point
-from ..solve.controls import CenterHeightControl, Control, VolumeControl
+from ..solve.controls import CONTROLS
 from ..solve.finer import met_across, solved_in, transferred
 from ..solve.resolution import largest_kink
 from ..solve.state import State
@@ -77,7 +77,7 @@ def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
         Open: its mesh has an accuracy and no elements.
     follow : callable
         What is wanted, or a part of it that shows how hard it is, on a scene with a mesh; it returns what it reached.
-    control : {"volume", "pressure", "height", "arc-length"}
+    control : {"volume", "pressure", "center_height", "arc-length"}
         How it is wanted.
 
     Raises
@@ -281,7 +281,7 @@ class _Trial:
             smooth = np.exp(np.interp(s, centres, np.log(density)))
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
-        if self.controls == ("height",):
+        if self.controls == ("center_height",):
             toward = 1 / (s + _POLE_RADIUS)
             total += _POLE_SHARE * toward / toward.mean()
         return s, total
@@ -292,10 +292,10 @@ class _Trial:
         return max(self._moved(potential, *self.states[k]) for k in which)
 
     def _moved(self, potential: Potential, x: Array, pressure: float) -> float:
-        volume, height = self.potential.evaluate(x, pressure).volume, self.potential.space.center_height(x)
-        controls: dict[str, Control] = {"volume": VolumeControl(volume), "height": CenterHeightControl(height)}
-        for control in reversed(self.controls):
-            result = solved_in(potential, controls[control], self.potential, x, pressure, damped=True)
+        volume = self.potential.evaluate(x, pressure).volume
+        for kind in (CONTROLS[name] for name in reversed(self.controls)):
+            held = kind.at(kind.value(self.potential.space, x, pressure, volume))
+            result = solved_in(potential, held, self.potential, x, pressure, damped=True)
             if result.status is Status.CONVERGED:
                 error = relative_error(potential, result.x, result.pressure, self.controls, self.scale)
                 return error if np.isfinite(error) else np.inf
@@ -342,7 +342,7 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
 
 def _controls(control: str) -> tuple[str, ...]:
     """What is held while errors are estimated, for a kind of run."""
-    return {"height": ("height",), "arc-length": ("volume", "height")}.get(control, ("volume",))
+    return {"center_height": ("center_height",), "arc-length": ("volume", "center_height")}.get(control, ("volume",))
 
 
 def _on(scene: Scene, mesh: Disc) -> Scene:

@@ -16,10 +16,10 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
-from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
+from ..solve.controls import CONTROLS
 from ..solve.minimize import minimize_and_verify, nlp_functions
 from ..solve.newton import correct
-from ..solve.start import start_at_height, start_at_pressure, start_at_volume
+from ..solve.start import cold_start
 from ..solve.state import Path, State
 from ..solve.stepping import Corrector, march
 from ..stability.profile import profile_at
@@ -39,16 +39,6 @@ TOLERANCES: Mapping[str, tuple[float, ...]] = {
     "published": (1e-3, 1e-5, 1e-7),
 }
 
-_CONTROLS: Mapping[str, Callable[[float], Control]] = {
-    "volume": VolumeControl,
-    "pressure": PressureControl,
-    "center_height": CenterHeightControl,
-}
-_COLD: Mapping[str, Callable[[Potential, float], State]] = {
-    "volume": start_at_volume,
-    "pressure": start_at_pressure,
-    "center_height": start_at_height,
-}
 #: radii of the profile that collocation sets out from
 _RADII = np.linspace(0, 1, 33)
 #: a relative error above this is another equilibrium, not an inaccurate one
@@ -262,9 +252,9 @@ class Course:
         step = (abs(load) / 60 or 0.02) if step is None else step
         direction = -1.0 if load < 0 else 1.0
         self.loads = [load - 2 * direction * step, load - direction * step, load]
-        self.control_at = _CONTROLS[control]
+        self.control_at = CONTROLS[control].at
         self.potential = potential_of(self.on_mesh(elements, MAX_DEGREE))
-        self.states = self.follow(self.potential, _COLD[control](self.potential, self.loads[0]))
+        self.states = self.follow(self.potential, cold_start(self.potential, control, self.loads[0]))
         coarser = potential_of(self.on_mesh(max(elements // 2, 1), MAX_DEGREE))
         result = correct(coarser, self.control_at(load), self.interpolate(2, coarser), self.states[2].pressure)
         value = self.quantity(self.states[2])
@@ -318,7 +308,7 @@ class Course:
 
     def cold(self, solver: str, problem: Potential) -> State:
         """The equilibrium without a neighbour, as :func:`femmembrane.equilibrium` finds it."""
-        start = _COLD[self.control](problem, self.load)
+        start = cold_start(problem, self.control, self.load)
         result = SOLVERS[solver](problem, self.control_at(self.load), start.x, start.pressure)
         if result.status is not Status.CONVERGED:
             raise SolveError("the cold start was not confirmed", status=result.status)

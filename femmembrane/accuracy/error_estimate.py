@@ -13,11 +13,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..errors import InputError, Status, unknown_name
+from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.banded import negative_directions
-from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
+from ..solve.controls import CONTROLS, control_kind
 from ..solve.finer import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
 from ..solve.resolution import unresolved
@@ -25,8 +25,6 @@ from ..solve.state import State
 from ..solve.wellposed import ill_posed
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import Verdict, axisymmetric_verdict
-
-CONTROLS = ("volume", "pressure", "height")
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class ErrorEstimate:
 
     Attributes
     ----------
-    control : {"volume", "pressure", "height"}
+    control : {"volume", "pressure", "center_height"}
         What is held while the space is refined: its own error is 0.
     pressure, volume, center_height, elastic_energy, magnetic_energy, energy : Deviation
         ``energy`` is elastic, magnetic and load energy together.
@@ -91,7 +89,7 @@ class ErrorEstimate:
     reason: str = ""
 
     def __str__(self) -> str:
-        lines = [f"at the same {self.control}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
+        lines = [f"at the same {CONTROLS[self.control].words}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
         for name in QUANTITIES:
             d: Deviation = getattr(self, name)
             lines.append(f"{name.replace('_', ' '):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
@@ -110,7 +108,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     potential : Potential
     x, pressure : ndarray, shape (n_free,), float
         The state.
-    control : {"volume", "pressure", "height"}
+    control : {"volume", "pressure", "center_height"}
         What is held.
     verdicts : mapping of "pressure" and "volume" to Verdict
         Those of the state.
@@ -120,10 +118,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     InputError
         For an unknown control.
     """
-    if not isinstance(control, str):
-        raise InputError("control", control, "a name is allowed")
-    if control not in CONTROLS:
-        raise unknown_name("control", control, CONTROLS)
+    control = control_kind(control).name
     evaluation = potential.evaluate(x, pressure)
     values = _numbers(potential, x, pressure, evaluation, verdicts)
     scene, method = finer_space(potential, evaluation)
@@ -169,18 +164,14 @@ def same_state(
     finer: Potential, potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str
 ) -> tuple[NewtonResult | None, str]:
     """The equilibrium in the finer space that the state stands for, or None with the reason why there is none."""
-    controls: dict[str, Control] = {
-        "volume": VolumeControl(evaluation.volume),
-        "pressure": PressureControl(pressure),
-        "height": CenterHeightControl(potential.space.center_height(x)),
-    }
-    held = controls[control]
+    kind = CONTROLS[control]
+    held = kind.at(kind.value(potential.space, x, pressure, evaluation.volume))
     start = transferred(potential.space, x, finer.space)
     side = _side(potential, evaluation, control)
 
     def judged(result: NewtonResult) -> str:
         if result.status is not Status.CONVERGED:
-            return f"the finer space has no equilibrium near at this {control}"
+            return f"the finer space has no equilibrium near at this {kind.words}"
         if _side(finer, result.evaluation, control) != side:
             return "in the finer space the state lies beyond a fold"
         if (change := moved(finer, result.x, start)) > FAR:
@@ -198,7 +189,7 @@ def same_state(
 
 def _side(potential: Potential, evaluation: Evaluation, control: str) -> int:
     """On which side of a fold of the control a state lies: its number of negative directions, which changes there."""
-    if control == "height":
+    if control == "center_height":
         return 0
     constraint = evaluation.volume_gradient if control == "volume" else None
     return negative_directions(evaluation.band, potential.space.half_bandwidth, constraint)
@@ -222,8 +213,7 @@ def _verdicts(
 
 
 def _compared(control: str, values: Mapping[str, float], better: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
-    held = {"height": "center_height"}.get(control, control)
-    errors = {name: 0.0 if name == held else value - better[name] for name, value in values.items()}
+    errors = {name: 0.0 if name == control else value - better[name] for name, value in values.items()}
     return from_numbers(control, values, errors, method, reason)
 
 
@@ -236,4 +226,4 @@ def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str,
     scales = {name: abs(value) for name, value in values.items()}
     scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
     parts = {name: Deviation(values[name], errors[name], scales[name]) for name in QUANTITIES}
-    return ErrorEstimate(control, **parts, method=method, reason=reason)
+    return ErrorEstimate(control_kind(control).name, **parts, method=method, reason=reason)

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from ..scene import Scene
-from .strong_form import CONTROLS, Array, Guess, Solution, StrongForm, check_tolerance, prescribed
+from .strong_form import POLE_UNKNOWN, Array, Guess, Solution, StrongForm, check_tolerance, prescribed
 
 #: where :func:`shoot` leaves the pole, by a series whose error is of order r^4
 _START = 1e-4
@@ -44,7 +44,7 @@ class _Shooter:
 
     @property
     def unknown(self) -> list[int]:
-        return [k for k in range(3) if k != CONTROLS[self.control]]
+        return [k for k in range(3) if k != POLE_UNKNOWN[self.control]]
 
     def pole(self, u: Array) -> Array:
         """(center height, stretch, pressure), shape (3, n), from the unknowns, shape (number of unknowns, n)."""

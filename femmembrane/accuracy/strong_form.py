@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import between, convert, number, only
 from ..discretization.meridian import Disc
 from ..errors import InputError
-from ..physics.checks import convert, is_number, number
 from ..physics.loads import over_projection, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density
 from ..scene import Scene
@@ -251,7 +251,7 @@ class Solution:
 
 
 #: what may be prescribed, as the position of its number in (center_height, stretch, pressure); a volume is none of them
-CONTROLS: Mapping[str, int | None] = {"center_height": 0, "pressure": 2, "volume": None}
+POLE_UNKNOWN: Mapping[str, int | None] = {"center_height": 0, "pressure": 2, "volume": None}
 
 
 def prescribed(volume: float | None, pressure: float | None, center_height: float | None) -> tuple[str, float]:
@@ -263,10 +263,7 @@ def prescribed(volume: float | None, pressure: float | None, center_height: floa
         Unless exactly one is given, a finite number.
     """
     given = {"volume": volume, "pressure": pressure, "center_height": center_height}
-    chosen = [(name, load) for name, load in given.items() if load is not None]
-    if len(chosen) != 1:
-        raise InputError("control", [name for name, _ in chosen], "exactly one of volume, pressure and center_height is allowed")
-    ((name, load),) = chosen
+    name, load = only("control", given, "exactly one of volume, pressure and center_height is allowed")
     return name, number(name, load, "one finite number is allowed")
 
 
@@ -278,6 +275,4 @@ def check_tolerance(key: str, value: Any, least: float) -> float:
     InputError
         Unless it is a number from ``least`` to 0.1.
     """
-    if not is_number(value) or not least <= value <= 0.1:
-        raise InputError(key, value, f"a number from {least:.1g} to 0.1 is allowed")
-    return float(value)
+    return between(key, value, least, 0.1, f"a number from {least:.1g} to 0.1 is allowed")

@@ -36,7 +36,7 @@ def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = 
         path = _bundled(str(path))
     tables = read_tables(path)
     if changes:
-        from ..verbs.keys import set_all
+        from ..scene.keys import set_all
 
         tables = set_all("--set", tables, changes)
     scene = Scene.from_dict(tables, path.parent)

@@ -64,7 +64,7 @@ def sweep(
     dry_run
         Only say how many scenes there are and how long they will take, from a few that are timed.
     """
-    from ..verbs.keys import values_of
+    from ..scene.keys import values_of
     from ..verbs.sweep import plan_sweep
     from ..verbs.sweep import sweep as compute
 

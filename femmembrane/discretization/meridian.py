@@ -25,8 +25,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FINITE, between, is_number, whole
 from ..errors import InputError
-from ..physics.checks import is_number
 from .supports import Support
 
 Array = NDArray[np.float64]
@@ -206,8 +206,7 @@ def _check_accuracy(mesh: Disc) -> None:
 
 
 def _positive(key: str, value: Any, least: float, most: float, what: str) -> None:
-    if not (is_number(value) and least <= float(value) <= most):
-        raise InputError(key, value, f"a number from {least:g} to {most:g} is allowed{what}")
+    between(key, value, least, most, f"a number from {least:g} to {most:g} is allowed{what}")
 
 
 @lru_cache(maxsize=64)
@@ -236,16 +235,13 @@ def extent(R: Array, Z: Array) -> float:
 
 def check_elements(value: Any, least: int = 1) -> int:
     """A number of elements, or InputError."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= MAX_ELEMENTS:
-        raise InputError("mesh.elements", value, f"a whole number >= {least} (and <= {MAX_ELEMENTS}) is allowed")
-    return int(value)
+    return whole("mesh.elements", value, f"a whole number >= {least} (and <= {MAX_ELEMENTS}) is allowed", least=least, most=MAX_ELEMENTS)
 
 
 def check_ratio(value: Any, meaning: str) -> float:
     """A ratio of sizes, or InputError."""
-    if not (is_number(value) and 1 / MAX_RATIO <= float(value) <= MAX_RATIO):
-        raise InputError("mesh.ratio", value, f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed ({meaning})")
-    return float(value)
+    allowed = f"a number from {1 / MAX_RATIO:g} to {MAX_RATIO:g} is allowed ({meaning})"
+    return between("mesh.ratio", value, 1 / MAX_RATIO, MAX_RATIO, allowed)
 
 
 def geometric_ends(elements: int, ratio: float) -> Array:
@@ -277,7 +273,7 @@ def _radii(values: Any) -> tuple[float, ...]:
         raise InputError("mesh.radii", values, allowed) from None
     for k, end in enumerate(ends):
         if not is_number(end):
-            raise InputError(f"mesh.radii[{k}]", end, "a finite number is allowed")
+            raise InputError(f"mesh.radii[{k}]", end, FINITE)
     if len(ends) < 2 or not abs(ends[0]) <= LEAST_LENGTH or not abs(ends[-1] - 1) <= LEAST_LENGTH:
         raise InputError("mesh.radii", ends, allowed)
     ends = (0.0, *ends[1:-1], 1.0)  # whoever computes them meets both ends to round-off only

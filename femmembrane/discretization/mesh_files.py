@@ -25,6 +25,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import store, switch
 from ..errors import InputError, unknown_name
 from .dialects import READERS, Lines, UnreadableError, read_lines
 from .merging import mended, merged
@@ -71,9 +72,7 @@ class Curve:
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", _points(self.points))
         object.__setattr__(self, "repaired", _remarks(self.repaired))
-        if not isinstance(self.curved, (bool, np.bool_)):
-            raise InputError("mesh.curved", self.curved, "true or false is allowed")
-        object.__setattr__(self, "curved", bool(self.curved))
+        store(self, curved=switch("mesh.curved", self.curved))
         try:
             object.__setattr__(self, "divisions", check_elements(self.divisions))
         except InputError as error:

@@ -29,8 +29,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..errors import InputError
-from ..physics.checks import as_float
+from ..checks import between, store
 from .meridian import ELEMENTS, Array, check_elements, check_ratio, geometric_ends, graded_alike
 from .supports import POLE, SUPPORTS, Support, check_support
 
@@ -331,7 +330,5 @@ def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
 
 def _convert(mesh: Any, name: str, *, above: float, below: float) -> None:
     """Turn an argument into a float between two bounds, or raise InputError."""
-    value = getattr(mesh, name)
-    if not above < as_float(value) < below:
-        raise InputError(f"mesh.{name}", value, f"a number between {above:g} and {below:g} is allowed (in units of R0)")
-    object.__setattr__(mesh, name, float(value))
+    allowed = f"a number between {above:g} and {below:g} is allowed (in units of R0)"
+    store(mesh, **{name: between(f"mesh.{name}", getattr(mesh, name), above, below, allowed, ends=False)})

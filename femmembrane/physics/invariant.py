@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import convert
 from ..errors import InputError
-from .checks import convert
 from .materials import NeoHookean
 
 _DOUBLE = NeoHookean()  # J/2, with its derivatives

@@ -15,8 +15,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..checks import convert, is_number
 from ..errors import InputError
-from .checks import convert, is_number
 
 
 def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .checks import as_float, convert
+from ..checks import FINITE, convert, sign, store
 from .outline import Outline
 
 Array = NDArray[np.float64]
@@ -127,7 +126,7 @@ def check_source(source: Any) -> None:
     lengths = "a finite number > 0 is allowed (in units of R0)"
     rules: dict[str, tuple[str, dict[str, float]]] = {
         "strength": ("a finite number >= 0 is allowed", {"least": 0.0, "most": _STRONGEST}),
-        "height": ("a finite number is allowed (in units of R0; negative is below)", {}),
+        "height": (FINITE + " (in units of R0; negative is below)", {}),
         "radius": (lengths, {"above": 0.0}),
         "length": (lengths, {"above": 0.0}),
     }
@@ -135,9 +134,7 @@ def check_source(source: Any) -> None:
         if hasattr(source, name):
             convert(source, f"source.{name}", allowed, **bounds)
     if hasattr(source, "orientation"):
-        if as_float(source.orientation) not in (1.0, -1.0):
-            raise InputError("source.orientation", source.orientation, "1 or -1 is allowed")
-        object.__setattr__(source, "orientation", int(source.orientation))
+        store(source, orientation=sign("source.orientation", source.orientation))
 
 
 def acting_sources(sources: Sequence[Source], susceptibility: Any) -> tuple[Source, ...]:

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..checks import convert, number
 from ..errors import InputError
-from .checks import convert, number
 
 
 class Material(Protocol):

@@ -25,8 +25,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, unknown_name
-from .checks import as_float, is_number
+from ..checks import as_float, choice, is_number
+from ..errors import InputError
 from .magnetics import Dipole
 
 #: SI unit of every quantity
@@ -189,8 +189,7 @@ class Scales:
 
 
 def _check_quantity(quantity: Any) -> None:
-    if not isinstance(quantity, str) or quantity not in UNITS:
-        raise unknown_name("quantity", quantity, UNITS)
+    choice("quantity", quantity, UNITS)
 
 
 def _values(quantity: str, value: Any) -> Array:

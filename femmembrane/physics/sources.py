@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..checks import store, whole
 from .magnetics import Source, check_source
 from .outline import Outline
 
@@ -98,9 +98,7 @@ class Solenoid(Source):
 
     def __post_init__(self) -> None:
         check_source(self)
-        if isinstance(self.loops, bool) or not isinstance(self.loops, (int, np.integer)) or not 1 <= self.loops <= 64:
-            raise InputError("source.loops", self.loops, "a whole number from 1 to 64 is allowed")
-        object.__setattr__(self, "loops", int(self.loops))
+        store(self, loops=whole("source.loops", self.loops, most=64))
 
     @property
     def circles(self) -> tuple[tuple[float, float], ...]:  # type: ignore[override]  # read only here, and there

@@ -19,8 +19,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import LARGEST, between, store
 from ..errors import InputError
-from .checks import LARGEST, as_float
 from .magnetics import Source, check_source
 
 _MAX_DEGREE = 40
@@ -62,9 +62,7 @@ class Tabulated(Source):
 
     def __post_init__(self) -> None:
         check_source(self)
-        if not 1e-10 <= as_float(self.tolerance) <= 0.1:
-            raise InputError("source.tolerance", self.tolerance, "a number from 1e-10 to 0.1 is allowed")
-        object.__setattr__(self, "tolerance", float(self.tolerance))
+        store(self, tolerance=between("source.tolerance", self.tolerance, 1e-10, 0.1))
         for name in ("rho", "z"):
             values = _array(name, getattr(self, name), 1)
             if values.size < 3 or not (np.diff(values) > 0).all() or (name == "rho" and values[0] < 0):

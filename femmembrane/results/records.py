@@ -213,7 +213,7 @@ class Equilibrium:
 
         Parameters
         ----------
-        control : {"volume", "pressure", "height"}
+        control : {"volume", "pressure", "center_height"}
             What is held: the errors are those of the other quantities at the same volume, pressure or pole height.
 
         Raises
@@ -222,8 +222,10 @@ class Equilibrium:
             For an unknown control.
         """
         from ..accuracy.error_estimate import estimate_errors
+        from ..solve.controls import control_kind
 
-        if not isinstance(control, str) or control not in self._errors:
+        control = control_kind(control).name
+        if control not in self._errors:
             verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
             self._errors[control] = estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
         return self._errors[control]

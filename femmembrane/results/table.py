@@ -53,8 +53,8 @@ def estimated(scene: Scene) -> tuple[str, tuple[str, ...]]:
     Held is what the scene's [run] prescribes; the volume with arc length and without a run.
     """
     run = scene.run
-    control = run.control if run is not None and run.control in ("pressure", "height") else "volume"
-    free = {"volume": ("pressure",), "pressure": ("volume",), "height": ("pressure", "volume")}[control]
+    control = (run.quantity if run is not None else None) or "volume"
+    free = tuple(name for name in ("pressure", "volume") if name != control)
     return control, (*free, "energy") if scene.analysis.error_estimates else ()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from .banded import BorderedFactor, band_product
-from .controls import ArcLengthControl
+from .controls import CONTROLS, ArcLengthControl, Controlled
 from .newton import correct
 from .state import Path, State, inner
 
@@ -57,12 +57,11 @@ class BranchPoint:
 
     def rate(self, quantity: str, potential: Potential) -> float:
         """Derivative of volume, pressure or center_height with respect to arc length: zero at a fold in that quantity."""
-        if quantity == "pressure":
-            return self.tangent_pressure
-        if quantity == "volume":
-            return float(self.state.evaluation.volume_gradient @ self.tangent)
-        pole = potential.space.pole
-        return float(self.tangent[pole]) if pole < self.tangent.size else 0.0
+        return self.rate_of(CONTROLS[quantity], potential)
+
+    def rate_of(self, controlled: Controlled, potential: Potential) -> float:
+        """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
+        return controlled.rate(potential.space, self.state.pressure, self.state.evaluation, self.tangent, self.tangent_pressure)
 
 
 @dataclass(slots=True)

@@ -2,18 +2,23 @@
 
 An equilibrium of E - P V has the n + 1 unknowns (x, P); the out-of-balance force E' - P V' = 0 gives n equations and a control the last
 one, N(x, P) = 0. Every control is solved by the same bordered Newton corrector.
+
+What can be prescribed is listed once, in :data:`CONTROLS`: whoever needs the equation of a control, its value in a state, or whether a
+minimiser can hold it, asks there. A new control is a line of that table, its equation, and a cold start in :mod:`.start`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
+from ..checks import choice, convert
 from ..discretization.space import Space
-from ..physics.checks import convert
 from ..potential import Array, Evaluation
+from ..scene.run import MINIMISED, PRESCRIBED
 
 
 class Control(Protocol):
@@ -50,12 +55,9 @@ class CenterHeightControl:
     height: float
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
-        return space.center_height(x) - self.height, self._row(space), 0.0
-
-    def _row(self, space: Space) -> Array:
         row = np.zeros(space.n_free)
         row[space.pole] = 1.0
-        return row
+        return space.center_height(x) - self.height, row, 0.0
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,19 @@ class Gas:
         """-dV/dP at constant amount."""
         return (volume + self.chamber) ** 2 / self.amount
 
+    def at(self, amount: float) -> Gas:
+        """Another amount of the gas, in the same chamber."""
+        return replace(self, amount=amount)
+
+    def value(self, space: Space, x: Array, pressure: float, volume: float) -> float:
+        """The amount of gas that holds a state: (P + atmosphere)(V + chamber)."""
+        return (pressure + self.atmosphere) * (volume + self.chamber)
+
+    def rate(self, space: Space, pressure: float, evaluation: Evaluation, dx: Array, dp: float) -> float:
+        """Derivative of that amount along a direction (dx, dP)."""
+        total, absolute = evaluation.volume + self.chamber, pressure + self.atmosphere
+        return dp * total + absolute * float(evaluation.volume_gradient @ dx)
+
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         absolute, total = pressure + self.atmosphere, evaluation.volume + self.chamber
         return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
@@ -113,3 +128,106 @@ class ArcLengthControl:
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         value = self.dual @ (x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
         return float(value), self.dual, self.dual_pressure
+
+
+class Controlled(Protocol):
+    """A number that a control holds and a branch is followed in: one of :data:`CONTROLS`, or the amount of a :class:`Gas`."""
+
+    def at(self, load: float, /) -> Control:
+        """The control that holds the number at a load."""
+
+    def value(self, space: Space, x: Array, pressure: float, volume: float) -> float:
+        """The number in a state."""
+
+    def rate(self, space: Space, pressure: float, evaluation: Evaluation, dx: Array, dp: float) -> float:
+        """Derivative of the number along a direction (dx, dP)."""
+
+
+@dataclass(frozen=True)
+class ControlKind:
+    """A quantity that can be prescribed.
+
+    Parameters
+    ----------
+    name : str
+        Public name: argument of the verbs, attribute of an equilibrium, column of a branch, key of :attr:`.Space.units`.
+    symbol : str
+        How messages and tables write it.
+    at : callable
+        The control that holds it at a load.
+    value : callable
+        Its value in a state: (space, x, pressure, volume) -> float.
+    rate : callable
+        Its derivative along a direction: (space, pressure, evaluation, dx, dP) -> float.
+    rest : callable
+        Its value in the undeformed membrane: space -> float.
+    """
+
+    name: str
+    symbol: str
+    at: Callable[[float], Control]
+    value: Callable[[Space, Array, float, float], float]
+    rate: Callable[[Space, float, Evaluation, Array, float], float]
+    rest: Callable[[Space], float]
+
+    @property
+    def words(self) -> str:
+        """The name as sentences have it."""
+        return self.name.replace("_", " ")
+
+    @property
+    def minimised(self) -> bool:
+        """Whether a minimiser can hold it; other controls take Newton's method."""
+        return self.name in MINIMISED
+
+
+def _pole_rate(space: Space, pressure: float, evaluation: Evaluation, dx: Array, dp: float) -> float:
+    return float(dx[space.pole]) if space.pole < dx.size else 0.0
+
+
+#: every quantity that can be prescribed, by its public name
+CONTROLS: Mapping[str, ControlKind] = {
+    kind.name: kind
+    for kind in (
+        ControlKind(
+            "volume",
+            "V",
+            VolumeControl,
+            value=lambda space, x, pressure, volume: volume,
+            rate=lambda space, pressure, evaluation, dx, dp: float(evaluation.volume_gradient @ dx),
+            rest=lambda space: space.reference_volume,
+        ),
+        ControlKind(
+            "pressure",
+            "P",
+            PressureControl,
+            value=lambda space, x, pressure, volume: pressure,
+            rate=lambda space, pressure, evaluation, dx, dp: dp,
+            rest=lambda space: 0.0,
+        ),
+        ControlKind(
+            "center_height",
+            "pole height",
+            CenterHeightControl,
+            value=lambda space, x, pressure, volume: space.center_height(x),
+            rate=_pole_rate,
+            rest=lambda space: space.first_height,
+        ),
+    )
+}
+
+
+def control_kind(name: str) -> ControlKind:
+    """The control with a public name, or with the word that [run] has for it (``height``).
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    known = PRESCRIBED.get(name, name) if isinstance(name, str) else name
+    return CONTROLS[choice("control", known, CONTROLS)]

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
-from .controls import Control, PressureControl, VolumeControl
+from .controls import CONTROLS, Control, VolumeControl
 from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, relative_size
 from .resolution import unresolved
@@ -32,8 +32,6 @@ FAR = 2e4
 SOFT, KICKS = 0.2, (-0.3, 0.3)
 #: most branch points at which the other branch is followed
 MOST_CROSSINGS = 16
-
-CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl}
 
 
 @dataclass
@@ -158,7 +156,7 @@ class Search:
 
     def _deflated(self) -> State | None:
         """A state not found yet, by Newton's method with the known ones deflated (Farrell, Birkisson and Funke, 2015)."""
-        control = CONTROLS[self.quantity](self.load)
+        control = CONTROLS[self.quantity].at(self.load)
         guesses = [(guess_at_volume(self.potential, v), 0.0 if self.quantity == "volume" else self.load) for v in self.starts]
         guesses += [(scale * s.x, s.pressure) for s in self.states for scale in (0.7, 1.3, -1.0)]
         guesses += [(x, s.pressure) for s in self.states for x in self._partners(s)]

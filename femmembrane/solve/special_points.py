@@ -17,7 +17,7 @@ from ..errors import SolveError, Status
 from ..potential import Potential
 from .banded import negative_directions
 from .continuation import BranchPoint, tangent_at, unit_point
-from .controls import ArcLengthControl, CenterHeightControl, Control, PressureControl, VolumeControl
+from .controls import CONTROLS, ArcLengthControl
 from .newton import TOLERANCE, correct
 from .state import State, flat_state, hermite, rests_flat
 from .wellposed import ill_posed
@@ -25,11 +25,6 @@ from .wellposed import ill_posed
 #: the folds looked for: their name and the quantity that is stationary
 FOLDS = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "center_height"}
 
-_CONTROLS: dict[str, Callable[[float], Control]] = {
-    "pressure": PressureControl,
-    "volume": VolumeControl,
-    "center_height": CenterHeightControl,
-}
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
 #: the least that does: next to a crossing of branches no correction falls below round-off over the distance to it
@@ -95,9 +90,7 @@ class Segment:
 
     def value(self, quantity: str, point: BranchPoint) -> float:
         """Volume, pressure or pole height of a point."""
-        if quantity == "center_height":
-            return self.potential.space.center_height(point.state.x)
-        return point.state.pressure if quantity == "pressure" else point.state.volume
+        return point.state.value_of(CONTROLS[quantity])
 
     def folds(self, kind: str) -> list[Located]:
         """All folds of a kind on the segment: sign changes of the rate, also those that the cubic through the ends shows in pairs."""
@@ -194,7 +187,7 @@ class Segment:
         share = brentq(lambda s: self.value(quantity, self.at(s)) - value, low, high, xtol=1e-14, rtol=8.9e-16, disp=False)
         point = self.at(share)
         pressure = value if quantity == "pressure" else point.state.pressure
-        exact = correct(self.potential, _CONTROLS[quantity](value), point.state.x, pressure, tolerance=_EXACT)
+        exact = correct(self.potential, CONTROLS[quantity].at(value), point.state.x, pressure, tolerance=_EXACT)
         if exact.status is not Status.CONVERGED:  # so close to a fold that the control is singular
             return point
         moved = tangent_at(self.potential, State.of(exact), point)

@@ -23,7 +23,7 @@ from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
 from .banded import negative_directions
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
-from .controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
+from .controls import CONTROLS, Control, ControlKind, Gas, PressureControl, VolumeControl
 from .finer import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
@@ -55,6 +55,28 @@ def moderate(potential: Potential) -> float:
     """By how much the volume of a moderately inflated membrane differs from that at rest."""
     space = potential.space
     return max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
+
+
+def cold_start(potential: Potential, quantity: str, load: float, *, stable: bool = True) -> State:
+    """The equilibrium at a load of any control in :data:`.CONTROLS`.
+
+    Parameters
+    ----------
+    potential : Potential
+    quantity : str
+        Public name of what is prescribed.
+    load : float
+    stable : bool
+        Whether only a stable state will do where a pressure is prescribed.
+
+    Raises
+    ------
+    SolveError
+        When none of the ways arrives.
+    """
+    if quantity == "pressure":
+        return start_at_pressure(potential, load, stable=stable)
+    return (start_at_volume if quantity == "volume" else start_at_height)(potential, load)
 
 
 def start_at_volume(potential: Potential, volume: float) -> State:
@@ -114,7 +136,7 @@ def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, 
         yield "sources and loads turned on there", lambda: _with_fields(potential, volume)
     if not near and not potential.space.loose:
         first = rest + float(np.copysign(size, volume - rest))
-        yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), "volume", volume)
+        yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume)
     yield f"{_GUESS} there", lambda: _held(potential, VolumeControl(volume), volume, 0.0)
 
 
@@ -186,7 +208,7 @@ def _inflated(potential: Potential, volume: float) -> State:
         found = None
         if there is not None:
             with suppress(SolveError):
-                found = _along(bare, there, "volume", volume)
+                found = _along(bare, there, CONTROLS["volume"], volume)
         if found is not None:
             back = correct(potential, VolumeControl(volume), found.x, found.pressure, magnetic=0.0, damped=True)
             if back.status is Status.CONVERGED:
@@ -290,23 +312,24 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
         nearly = (abs(load) / units["pressure"] / 4) ** (1 / 3)
         if not potential.surrounded or 0 < nearly <= NEARLY_FLAT:
             size = min(size, nearly * units["volume"])
+    held, sides = CONTROLS["pressure"], _sides(load)
     try:
-        return _first_of(_ways_from(potential, "pressure", pressure, size, _sides(load), _is_minimum), f"P = {pressure:.9g} that is stable")
+        return _first_of(_ways_from(potential, held, pressure, size, sides, _is_minimum), f"P = {pressure:.9g} that is stable")
     except SolveError:
         if stable:
             raise
-    return _first_of(_ways_from(potential, "pressure", pressure, size, _sides(load)), f"P = {pressure:.9g}")
+    return _first_of(_ways_from(potential, held, pressure, size, sides), f"P = {pressure:.9g}")
 
 
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
-    if at_rest(potential, "height", height):
+    if at_rest(potential, "center_height", height):
         return flat_state(potential)
     sides = _sides(height - potential.space.first_height * (not potential.flat))
     size = moderate(potential)
     if potential.flat and not potential.surrounded:  # a branch leads past the flat membrane, which has no stiffness, nowhere near it
         size = min(size, 2 * abs(height) * potential.space.unit**2)
-    ways = _ways_from(potential, "center_height", height, size, sides)
+    ways = _ways_from(potential, CONTROLS["center_height"], height, size, sides)
     return _first_of(ways, f"a pole height of {height:.6g}")
 
 
@@ -319,7 +342,7 @@ def start_in_gas(potential: Potential, gas: Gas) -> State:
 
 def _ways_from(
     potential: Potential,
-    quantity: str | Gas,
+    held: ControlKind | Gas,
     load: float,
     size: float,
     sides: tuple[float, float],
@@ -332,39 +355,28 @@ def _ways_from(
             first = rest + side * share * size
             yield (
                 f"the branch through V = {first:.6g}",
-                lambda first=first: _along(potential, start_at_volume(potential, first), quantity, load, accept),  # type: ignore[misc]
+                lambda first=first: _along(potential, start_at_volume(potential, first), held, load, accept),  # type: ignore[misc]
             )
-    pressure = load if quantity == "pressure" else 0.0
+    pressure = load if held is CONTROLS["pressure"] else 0.0
     for side in sides:
         for share in (1.0, 4.0, 16.0):
             guess = rest + side * share * size
             yield (
                 f"{_GUESS} with V = {guess:.6g}",
-                lambda guess=guess: _held(potential, _control(quantity, load), guess, pressure, accept),  # type: ignore[misc]
+                lambda guess=guess: _held(potential, held.at(load), guess, pressure, accept),  # type: ignore[misc]
             )
 
 
-def _control(quantity: str | Gas, load: float) -> Control:
-    if isinstance(quantity, Gas):
-        return quantity
-    controls: dict[str, Callable[[float], Control]] = {
-        "volume": VolumeControl,
-        "pressure": PressureControl,
-        "center_height": CenterHeightControl,
-    }
-    return controls[quantity](load)
-
-
 def _along(
-    potential: Potential, state: State, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None = None
+    potential: Potential, state: State, held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None = None
 ) -> State | None:
     """The first state at a load, that will do, on the branch through a state; None if there is none within the bounds."""
     point = first_point(potential, state, 1)
-    rises = (load - _amount(potential, point, quantity)) * _rate(potential, point, quantity) >= 0
+    rises = (load - state.value_of(held)) * point.rate_of(held, potential) >= 0
     failure = None
     for direction in (1, -1) if rises else (-1, 1):
         try:
-            found = _first_met(potential, first_point(potential, state, direction), quantity, load, accept)
+            found = _first_met(potential, first_point(potential, state, direction), held, load, accept)
         except SolveError as error:
             failure = failure or error
             continue
@@ -375,32 +387,17 @@ def _along(
     return None
 
 
-def _amount(potential: Potential, point: BranchPoint, quantity: str | Gas) -> float:
-    state = point.state
-    if isinstance(quantity, Gas):
-        return (state.pressure + quantity.atmosphere) * (state.volume + quantity.chamber)
-    values = {"volume": state.volume, "pressure": state.pressure, "center_height": potential.space.center_height(state.x)}
-    return values[quantity]
-
-
-def _rate(potential: Potential, point: BranchPoint, quantity: str | Gas) -> float:
-    if isinstance(quantity, Gas):
-        total, absolute = point.state.volume + quantity.chamber, point.state.pressure + quantity.atmosphere
-        return point.rate("pressure", potential) * total + absolute * point.rate("volume", potential)
-    return point.rate(quantity, potential)
-
-
 def _first_met(
-    potential: Potential, point: BranchPoint, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None
+    potential: Potential, point: BranchPoint, held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None
 ) -> State | None:
-    if _amount(potential, point, quantity) == load and (accept is None or accept(point.state)):
+    if point.state.value_of(held) == load and (accept is None or accept(point.state)):
         return point.state
     away = abs(point.state.volume - potential.space.reference_volume) / potential.space.units["volume"]
     control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
     tracer = Tracer(Path(), control.first * min(1.0, np.sqrt(away)), control)
     spare = None
     for _, new in zip(range(_STEPS), trace_points(potential, point, tracer), strict=False):
-        for state in _met(Segment(potential, point, new), quantity, load, accept):
+        for state in _met(Segment(potential, point, new), held, load, accept):
             if _well_posed(state):
                 return state
             spare = spare or state
@@ -416,14 +413,14 @@ def _first_met(
     return spare
 
 
-def _met(segment: Segment, quantity: str | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
+def _met(segment: Segment, held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
     """States at the load on a segment that will do."""
-    if isinstance(quantity, Gas):
-        yield from _gas_met(segment, quantity)
+    if isinstance(held, Gas):
+        yield from _gas_met(segment, held)
         return
-    for met in segment.crossings(quantity, load):
+    for met in segment.crossings(held.name, load):
         # at the limit point itself round-off has the sign of the smallest eigenvalue: there the side that is stable says it
-        at_limit = quantity == "pressure" and any(met is fold.point for fold in segment.folds("limit_point"))
+        at_limit = held is CONTROLS["pressure"] and any(met is fold.point for fold in segment.folds("limit_point"))
         judged = (segment.a, segment.b) if at_limit else (met,)
         if accept is None or any(accept(p.state) for p in judged):
             yield met.state
@@ -432,10 +429,10 @@ def _met(segment: Segment, quantity: str | Gas, load: float, accept: Callable[[S
 def _gas_met(segment: Segment, gas: Gas) -> Iterator[State]:
     """The state at the amount of a gas between two points of a branch, both of which compress it."""
     ends = (segment.a, segment.b)
-    held = [_amount(segment.potential, point, gas) - gas.amount for point in ends]
-    if held[0] * held[1] > 0 or any(point.state.volume <= -gas.chamber for point in ends):
+    missing = [point.state.value_of(gas) - gas.amount for point in ends]
+    if missing[0] * missing[1] > 0 or any(point.state.volume <= -gas.chamber for point in ends):
         return
-    share = held[0] / (held[0] - held[1])
+    share = missing[0] / (missing[0] - missing[1])
     near = segment.at(share) if 0 < share < 1 else segment.b
     result = correct(segment.potential, gas, near.state.x, near.state.pressure, damped=True)
     if result.status is Status.CONVERGED:

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, band_inner
-from .controls import PressureControl
+from .controls import CONTROLS, Controlled, PressureControl
 from .newton import NewtonResult, correct
 
 
@@ -49,6 +49,10 @@ class State:
     def volume(self) -> float:
         return self.evaluation.volume
 
+    def value_of(self, controlled: Controlled) -> float:
+        """The number that a control holds, in this state."""
+        return controlled.value(self.evaluation.potential.space, self.x, self.pressure, self.volume)
+
 
 def rests_flat(potential: Potential) -> bool:
     """Whether the undeformed membrane is an equilibrium without load: nothing pulls at it."""
@@ -57,8 +61,7 @@ def rests_flat(potential: Potential) -> bool:
 
 def at_rest(potential: Potential, quantity: str, load: float) -> bool:
     """Whether the membrane at rest is an equilibrium at a load: one without stiffness, which no path leaves or passes."""
-    rest = {"volume": potential.space.reference_volume, "pressure": 0.0, "height": potential.space.first_height}
-    return load == rest[quantity] and rests_flat(potential)
+    return load == CONTROLS[quantity].rest(potential.space) and rests_flat(potential)
 
 
 def flat_state(potential: Potential) -> State:

@@ -36,8 +36,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from ..checks import choice, whole
 from ..discretization.space import Space, band_of
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
@@ -428,8 +429,7 @@ def _response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse
 
 
 def _check_waves(n: int, least: int) -> None:
-    if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < least:
-        raise InputError("azimuthal", n, f"a whole number >= {least} is allowed")
+    whole("azimuthal", n, least=least)
 
 
 def _density(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: float, n: int) -> list[Array]:
@@ -612,16 +612,14 @@ def lowest_eigenvalues(
     SpectrumError
         When the eigenvalues found cannot be proved to be the lowest.
     """
-    if control not in ("pressure", "volume"):
-        raise unknown_name("control", control, ("pressure", "volume"))
+    choice("control", control, ("pressure", "volume"))
     operator = azimuthal_operator(potential, x, pressure, n)
     size = operator.band.shape[1]
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 1 <= count < size - 1:
-        raise InputError("count", count, f"a whole number from 1 to {size - 2} is allowed")
+    count = whole("count", count, most=size - 2)
     constraint = potential.evaluate(x, pressure).volume_gradient if n == 0 and control == "volume" else None
     spectrum = _Spectrum(operator, constraint)
     for width in (max(2 * count + 1, 20), max(4 * count + 1, 60)):
-        found = spectrum.lanczos(int(count), min(width, size))
+        found = spectrum.lanczos(count, min(width, size))
         # all that lies clearly below the last one must have been found
         shift = found[-1][0] - max(1e-6 * abs(found[-1][0]), 1e-12 * spectrum.scale)
         if spectrum.count(shift) == sum(value < shift for value, _ in found):

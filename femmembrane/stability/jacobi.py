@@ -28,8 +28,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from ..checks import choice
 from ..discretization.meridian import disc
-from ..errors import InputError, SolveError, Status, unknown_name
+from ..errors import InputError, SolveError, Status
 from ..physics.loads import over_projection
 from ..potential import Array, Potential, potential_of
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
@@ -124,8 +125,7 @@ def jacobi_test(equilibrium: Equilibrium, form: str = "corrected", *, start: flo
     SolveError
         When the integration fails.
     """
-    if form not in FORMS:
-        raise unknown_name("form", form, FORMS)
+    choice("form", form, FORMS)
     if not 0 < start <= 0.01:
         raise InputError("start", start, "a radius in (0, 0.01] is allowed")
     if equilibrium.scene.mesh.shape != "disc":

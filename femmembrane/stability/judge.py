@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ..checks import whole
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..scene import MAX_WAVES
@@ -47,17 +48,16 @@ def judge(
     InputError
         When neither or both of control and azimuthal are given, or one is unknown.
     """
-    if isinstance(azimuthal, bool) or not isinstance(azimuthal, (int, np.integer)) or not 0 <= azimuthal <= MAX_WAVES:
-        raise InputError("azimuthal", azimuthal, f"a whole number from 0 to {MAX_WAVES} is allowed")
+    azimuthal = whole("azimuthal", azimuthal, least=0, most=MAX_WAVES)
     if azimuthal and control is not None:
         raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
     if not azimuthal and control is None:
         raise InputError("control", control, "one of " + ", ".join(CONTROLS) + " is allowed, or azimuthal=1, 2, ...")
-    ask = partial(_verdict, control=control, azimuthal=int(azimuthal), compliance=compliance)
+    ask = partial(_verdict, control=control, azimuthal=azimuthal, compliance=compliance)
     try:
         verdict = ask(potential, x, pressure, evaluation, guess=guess)
     except SpectrumError as error:  # one verdict that cannot be proved must not cost the run that asked for it
-        return Verdict(None, np.nan, np.nan, control, int(azimuthal), None, f"not decided: {error}")
+        return Verdict(None, np.nan, np.nan, control, azimuthal, None, f"not decided: {error}")
     value = abs(verdict.smallest_eigenvalue)
     if value < max(small_eigenvalue(potential.space), _CLEAR * verdict._unresolved):  # never for NaN
         verdict = _with_discretisation_error(verdict, potential, pressure, evaluation, ask)

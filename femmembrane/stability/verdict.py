@@ -12,8 +12,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import choice
 from ..discretization.space import Space
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 from ..potential import Evaluation, Potential
 from ..solve.wellposed import apparent, ill_posed
 from .floating import pencil_of
@@ -95,10 +96,7 @@ def axisymmetric_verdict(
     InputError
         For an unknown control, or "gas" without the gas.
     """
-    if control not in CONTROLS:
-        raise (
-            unknown_name("control", control, CONTROLS) if isinstance(control, str) else InputError("control", control, "a name is allowed")
-        )
+    choice("control", control, CONTROLS)
     shown = apparent(potential, evaluation)
     bad = ill_posed(potential, evaluation) if shown else None
     if bad is not None:

@@ -25,8 +25,8 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import choice
 from ..discretization.space import Space, space_of_scene
-from ..errors import unknown_name
 from ..potential import potential_of
 from ..scene import WRINKLING, Scene
 from ..solve.finer import survives
@@ -128,8 +128,7 @@ class Zones(Sequence[Zone]):
         InputError
             For an unknown kind.
         """
-        if kind not in KINDS:
-            raise unknown_name("kind", kind, KINDS)
+        choice("kind", kind, KINDS)
         return float(sum(zone.area_fraction for zone in self if zone.kind == kind))
 
     def numbers(self, s: ArrayLike) -> NDArray[np.int64]:
@@ -169,8 +168,7 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
     InputError
         For an unknown criterion.
     """
-    if not isinstance(criterion, str) or criterion not in WRINKLING:
-        raise unknown_name("criterion", criterion, WRINKLING)
+    choice("criterion", criterion, WRINKLING)
 
     deciding = _deciding(scene, x, pressure, criterion)
     codes, edges = _tiles(space_of_scene(scene), deciding)

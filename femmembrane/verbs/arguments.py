@@ -5,9 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
-from ..errors import InputError, unknown_name
+from ..checks import choice, is_whole, whole
+from ..errors import InputError
 from ..potential import Potential
 from ..scene import MAX_STEPS, Scene
 
@@ -22,14 +21,12 @@ def check_scene(scene: Any) -> None:
 
 def check_max_steps(max_steps: Any) -> None:
     """Raise InputError unless a largest number of steps is a whole number from 1 to MAX_STEPS."""
-    if isinstance(max_steps, bool) or not isinstance(max_steps, (int, np.integer)) or not 1 <= max_steps <= MAX_STEPS:
-        raise InputError("max_steps", max_steps, f"a whole number from 1 to {MAX_STEPS} is allowed")
+    whole("max_steps", max_steps, most=MAX_STEPS)
 
 
 def check_ill_posed(ill_posed: Any) -> None:
     """Raise InputError unless what to do in compression is known."""
-    if ill_posed not in ILL_POSED:
-        raise unknown_name("ill_posed", str(ill_posed), ILL_POSED)
+    choice("ill_posed", ill_posed, ILL_POSED)
 
 
 def check_height(key: str, potential: Potential) -> None:
@@ -47,7 +44,6 @@ def check_increasing(key: str, values: Any, most: int | None = None) -> tuple[in
         numbers = tuple(values)
     except TypeError:
         raise InputError(key, values, allowed) from None
-    whole = all(isinstance(v, (int, np.integer)) and not isinstance(v, bool) and 1 <= v <= (most or np.inf) for v in numbers)
-    if not numbers or not whole or any(b <= a for a, b in pairwise(numbers)):
+    if not numbers or not all(is_whole(v, most=most) for v in numbers) or any(b <= a for a, b in pairwise(numbers)):
         raise InputError(key, values, allowed)
     return tuple(int(v) for v in numbers)

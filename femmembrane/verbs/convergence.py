@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, HEADINGS, PROFILES, ROUND_OFF, Convergence, profile_norms
-from ..errors import InputError, SolveError, Status
+from ..checks import only, switch
+from ..errors import SolveError, Status
 from ..potential import Array, potential_of
 from ..results.records import Equilibrium
 from ..scene import MAX_DEGREE, Scene
-from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl
+from ..solve.controls import CONTROLS, Control, control_kind
 from ..solve.finer import transferred
 from ..solve.newton import correct
 from ..solve.start import moderate
@@ -23,7 +23,6 @@ from .follow import equilibrium, run
 from .recording import record
 from .trace import trace
 
-_CONTROLS: dict[str, Any] = {"volume": VolumeControl, "pressure": PressureControl, "center_height": CenterHeightControl}
 #: least number of elements of the reference, all of the highest degree
 _REFERENCE_ELEMENTS = 32
 #: a branch is traced from the moderately inflated membrane to a little beyond the volume of its first limit point
@@ -74,16 +73,12 @@ def convergence(
     check_scene(scene)
     degrees = check_increasing("degrees", degrees, MAX_DEGREE)
     elements = check_increasing("elements", elements, None)
-    if not isinstance(limit_points, bool):
-        raise InputError("limit_points", limit_points, "True or False is allowed")
-    asked = {"volume": volume, "pressure": pressure, "center_height": center_height}
-    given = {name: value for name, value in asked.items() if value is not None}
-    if len(given) != 1:
-        raise InputError("convergence", sorted(given), "exactly one of volume, pressure and center_height is allowed")
-    ((name, load),) = given.items()
+    switch("limit_points", limit_points, "True or False is allowed")
+    given = {"volume": volume, "pressure": pressure, "center_height": center_height}
+    name, load = only("convergence", given, "exactly one of volume, pressure and center_height is allowed")
     plain = scene.replace(run=None, analysis=type(scene.analysis)())
     found = equilibrium(plain, volume=volume, pressure=pressure, center_height=center_height, start=start, solver="newton")
-    control = _CONTROLS[name](float(load))
+    control = CONTROLS[name].at(float(load))
     return _Study(found.scene, name, control, degrees, elements, limit_points).run(scene, float(load), found)
 
 
@@ -106,9 +101,9 @@ def convergence_of_run(scene: Scene, *, degrees: Sequence[int], elements: Sequen
     if plain.run.until is not None:
         ((name, load),) = plain.run.until.items()
     else:
-        name, load = {"height": "center_height"}.get(plain.run.control, plain.run.control), float(plain.run.loads()[-1])
+        name, load = control_kind(plain.run.control).name, float(plain.run.loads()[-1])
     last = branch[-1]
-    return _Study(last.scene, name, _CONTROLS[name](load), degrees, elements, False).run(scene, load, last)
+    return _Study(last.scene, name, CONTROLS[name].at(load), degrees, elements, False).run(scene, load, last)
 
 
 class _Study:

@@ -19,17 +19,18 @@ import numpy as np
 from ..accuracy import cost as work
 from ..accuracy.cost import Course, Job, Measurement, Outcome, Reference
 from ..accuracy.strong_form import StrongForm, prescribed
+from ..checks import is_number, is_whole
 from ..errors import InputError, SolveError, unknown_name
 from ..native import native
-from ..potential import Potential, potential_of
+from ..potential import potential_of
 from ..results.origin import NOTED_VERSIONS, processor
 from ..results.records import Branch, Equilibrium
 from ..results.store import package_version, replace_file, save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene
 from ..solve.banded import BandFactor, BorderedFactor
-from ..solve.start import start_at_height, start_at_pressure, start_at_volume
-from ..solve.state import State
+from ..solve.controls import CONTROLS, control_kind
+from ..solve.start import cold_start
 from ..stability.judge import judge
 from ..stability.zones import find_zones
 from ..threads import one_thread
@@ -55,7 +56,6 @@ QUICK: Mapping[str, Any] = {
     "budget": 0.2,
     "reference_elements": 32,
 }
-_SYMBOLS = {"volume": "V", "pressure": "P", "center_height": "pole height"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,14 +218,14 @@ def cost(
     _known("starts", starts, work.STARTS)
     _known("methods", methods or (), work.METHODS)
     for key, value, least in (("budget", budget, 0.0), ("step", 1.0 if step is None else step, np.nextafter(0, 1))):
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not least <= value < np.inf:
+        if not (is_number(value) and value >= least):
             raise InputError(key, value, f"a finite number {'>' if key == 'step' else '>='} 0 is allowed")
     if methods is None:
         methods = tuple(work.METHODS) if _has_strong_form(scene) else ()
     elif methods:
         StrongForm(scene)  # says why not
     _known("tolerances", [m for m in methods if m not in tolerances], ())
-    if control == "center_height":
+    if not CONTROLS[control].minimised:
         solvers = [s for s in solvers if s != "ipopt"]
     course = Course(scene, control, load, step, max(reference_elements, *elements))
     if "ipopt" in solvers and len(degrees) * len(elements) > work.most_meshes():
@@ -254,7 +254,7 @@ def asked_load(scene: Scene) -> dict[str, Any]:
         raise InputError("run", None, "missing; the load that is studied is the last one of [run]")
     if scene.run.control == "arc-length":
         return dict(scene.run.until or {})
-    return {{"height": "center_height"}.get(scene.run.control, scene.run.control): float(scene.run.loads()[-1])}
+    return {control_kind(scene.run.control).name: float(scene.run.loads()[-1])}
 
 
 def machine() -> dict[str, str]:
@@ -272,7 +272,7 @@ def machine() -> dict[str, str]:
 def _whole(key: str, values: Sequence[int], most: int | None = None) -> None:
     numbers: list[Any] = list(values) if isinstance(values, Iterable) and not isinstance(values, (str, bytes)) else []
     for n in numbers or [None]:
-        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1 or (most is not None and n > most):
+        if not is_whole(n, most=most):
             raise InputError(key, n if numbers else values, f"whole numbers {'>= 1' if most is None else f'from 1 to {most}'} are allowed")
 
 
@@ -369,13 +369,8 @@ def _effects(course: Course) -> list[Job]:
 
 def _recorded(course: Course, scene: Scene) -> Callable[[], Outcome]:
     potential = potential_of(scene)
-    cold: dict[str, Callable[[Potential, float], State]] = {
-        "volume": start_at_volume,
-        "pressure": start_at_pressure,
-        "center_height": start_at_height,
-    }
     try:
-        again = course.step(potential, cold[course.control](potential, course.loads[0]))
+        again = course.step(potential, cold_start(potential, course.control, course.loads[0]))
         previous = record(scene, potential, again("newton", potential))  # lends its modes as the state before does on a branch
     except SolveError as error:
         message = str(error)
@@ -405,7 +400,7 @@ def _number(value: Any, form: str, width: int) -> str:
 def _text(study: Cost) -> Iterator[str]:
     letter = "V" if study.quantity == "volume" else "P"
     reference = study.reference
-    at = f"{_SYMBOLS[study.control]} = {study.load:.9g}"
+    at = f"{CONTROLS[study.control].symbol} = {study.load:.9g}"
     yield f"One equilibrium at {at}: relative error in {letter} and milliseconds (* nothing is better in both)"
     yield (
         f"reference: {letter} = {reference.value:.15g}, {reference.elements} elements of degree {reference.degree}, "

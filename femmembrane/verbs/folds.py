@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Evaluation, Family, Potential, potential_of
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
+from ..scene.variation import Parameter
 from ..solve import resolution, wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
-from ..solve.parameter import Parameter
 from ..solve.start import CONTACT
 from ..solve.state import State
 from ..threads import one_thread
@@ -340,8 +341,7 @@ def _frozen(column: list[float]) -> Array:
 
 
 def _bounds(parameter: Parameter, bounds: tuple[float, float], direction: int) -> tuple[float, float]:
-    if isinstance(direction, bool) or direction not in (1, -1):
-        raise InputError("direction", direction, "1 (towards larger values) or -1 is allowed")
+    direction = sign("direction", direction, "1 (towards larger values) or -1 is allowed")
     try:
         low, high = (float(b) for b in bounds)
     except (TypeError, ValueError, OverflowError):

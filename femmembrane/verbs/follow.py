@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy.adapt import spread
-from ..errors import InputError, SolveError, Status, unknown_name
-from ..physics.checks import LARGEST, number
+from ..checks import LARGEST, choice, number, only
+from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.checkpoint import same_scene
 from ..results.records import Branch, Equilibrium, Jump, PathMemory, SoFar, SpecialPoint
 from ..scene import MAX_STEPS, Scene
-from ..solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
+from ..solve.controls import CONTROLS, Gas, control_kind
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import TOLERANCE, correct
 from ..solve.resolution import refuse_unresolved
 from ..solve.search import Limit, beyond_crossing, beyond_limit, loss_before
 from ..solve.special_points import ON_FOLD
-from ..solve.start import moderate, start_at_height, start_at_pressure, start_at_volume, start_in_gas
+from ..solve.start import cold_start, moderate, start_in_gas
 from ..solve.state import Path, State, at_rest, distance, flat_state, rests_flat
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness, unresolved_source
@@ -34,15 +34,6 @@ from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restor
 from .trace import resume_trace, trace
 
 _SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
-_CONTROLS: dict[str, Callable[[float], Control]] = {"volume": VolumeControl, "pressure": PressureControl, "height": CenterHeightControl}
-#: cold starts at a load; the last argument says whether only a stable state will do
-_STARTS: dict[str, Callable[[Potential, float, bool], State]] = {
-    "volume": lambda potential, load, stable: start_at_volume(potential, load),
-    "pressure": lambda potential, load, stable: start_at_pressure(potential, load, stable=stable),
-    "height": lambda potential, load, stable: start_at_height(potential, load),
-}
-#: the controls of a minimiser; a height is held by no potential
-_MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
 #: share of a load at which a path to the flat membrane at rest, or through it, is close enough to leave out the rest
 NEAR_ZERO = 1e-3
@@ -106,6 +97,23 @@ def pressurize(
     """Follow the membrane through given pressures P = p R0/(mu T), in the order given; otherwise as :func:`inflate`.
 
     Without ``start`` the first state is the first stable equilibrium met on the branch through the moderately inflated membrane.
+
+    Parameters
+    ----------
+    scene : Scene
+    pressures : array_like
+        Pressures P = p R0/(mu T), signed.
+    start, solver, at_limit, throw, on_step
+        As in :func:`inflate`.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter carries the branch up to the failure as ``result``.
     """
     return _follow(scene, "pressure", _loads("pressures", pressures), start, solver, throw, on_step, at_limit)
 
@@ -127,20 +135,35 @@ def equilibrium(
     minimum (``solver="ipopt"``), or any solution of the equations (``"newton"``). The other two always take the Newton corrector:
     a height is held by no potential, and with a gas the branch is followed as the gas is let in.
 
+    Parameters
+    ----------
+    scene : Scene
+    volume : float, optional
+        Enclosed volume over R0^3 (with the 2 pi), signed.
+    pressure : float, optional
+        P = p R0/(mu T).
+    center_height : float, optional
+        Height over R0 of the pole, or of the first point of a meridian without a pole.
+    gas : Gas, optional
+        Amount of gas behind the membrane.
+    start : Equilibrium, optional
+        A neighbour to start from; default: a cold start from the moderately inflated membrane.
+    solver : {"ipopt", "newton"}
+        Minimiser, or the bordered corrector (which also finds saddle points).
+
+    Returns
+    -------
+    Equilibrium
+
     Raises
     ------
     InputError, SolveError
     """
-    given: dict[str, Any] = {
-        k: v for k, v in (("volume", volume), ("pressure", pressure), ("height", center_height), ("gas", gas)) if v is not None
-    }
-    if len(given) != 1:
-        raise InputError("equilibrium", sorted(given), "exactly one of volume, pressure, center_height and gas is allowed")
+    given = {"volume": volume, "pressure": pressure, "center_height": center_height, "gas": gas}
+    control, load = only("equilibrium", given, "exactly one of volume, pressure, center_height and gas is allowed")
     if gas is not None:
         return _in_gas(scene, gas, start)
-    ((control, load),) = given.items()
-    key = {"height": "center_height"}.get(control, control)
-    value = np.array([number(key, load, "one finite number is allowed")])
+    value = np.array([number(control, load, "one finite number is allowed")])
     return _follow(scene, control, value, start, solver, True, None)[0]
 
 
@@ -180,7 +203,7 @@ def run(
         return trace(scene, start=cast(float, asked.start), throw=False, **ways, **observers)
     return _follow(
         scene,
-        asked.control,
+        control_kind(asked.control).name,
         asked.loads(),
         None,
         asked.solver,
@@ -219,10 +242,8 @@ def _follow(
     on_checkpoint: OnCheckpoint | None = None,
     kept: Branch | None = None,
 ) -> Branch:
-    if solver not in _SOLVERS:
-        raise unknown_name("solver", solver, _SOLVERS)
-    if at_limit not in AT_LIMIT:
-        raise unknown_name("at_limit", str(at_limit), AT_LIMIT)
+    choice("solver", solver, _SOLVERS)
+    choice("at_limit", at_limit, AT_LIMIT)
 
     def trial(on_mesh: Scene, begin: Equilibrium | None) -> Branch:
         return _follow(on_mesh, control, loads[spread(loads)], begin, solver, False, None, at_limit)
@@ -234,7 +255,7 @@ def _follow(
             raise
         return Branch(scene, (), error.status, str(error))
     clock, potential = time.perf_counter(), potential_of(scene)
-    if control == "height":
+    if control == "center_height":
         check_height("center_height", potential)
     timings |= {"setup": time.perf_counter() - clock, "solve": 0.0, "verdicts": 0.0}
     found: list[Equilibrium] = []
@@ -243,7 +264,7 @@ def _follow(
     if shortfall is not None:
         status, message = Status.ACCURACY_NOT_MET, str(shortfall)
         loads = loads[: spread(loads)[shortfall.kept - 1] + 1]
-    used = solver if control in _MINIMISED else "newton"
+    used = solver if CONTROLS[control].minimised else "newton"
     walk = _Walk(potential, control, _SOLVERS[solver], start)
     if kept is not None:
         found, jumps, timings = list(kept), list(kept.jumps), {**timings, **kept.timings}
@@ -253,7 +274,7 @@ def _follow(
         try:
             state, limit = walk.to(float(load), at_limit == "jump")
         except SolveError as error:
-            status, message = error.status, f"{control} {load:.9g} was not reached: {error}"
+            status, message = error.status, f"{CONTROLS[control].words} {load:.9g} was not reached: {error}"
             timings["solve"] += time.perf_counter() - clock
             break
         solved = time.perf_counter()
@@ -266,7 +287,10 @@ def _follow(
         if on_step is not None:
             on_step(index, len(loads), new)
         if new.status is Status.SLACK and index + 1 < len(loads):
-            status, message = Status.SLACK, f"{control} {loads[index + 1]:.9g} was not reached: {slackness(potential, state)}"
+            status, message = (
+                Status.SLACK,
+                f"{CONTROLS[control].words} {loads[index + 1]:.9g} was not reached: {slackness(potential, state)}",
+            )
             break
         if on_checkpoint is not None:
             memory = remembered(walk.path, potential.space.n_free)
@@ -319,10 +343,7 @@ class _Turn:
 
 def _load_of(start: Equilibrium, control: str, potential: Potential, state: State) -> float:
     """The load of a start; that of the state it was corrected to where this is another one, as in another scene."""
-    given = {"volume": start.volume, "pressure": start.pressure, "height": start.center_height}[control]
-    height = potential.space.center_height(state.x)
-    found = {"volume": state.evaluation.volume, "pressure": state.pressure, "height": height}[control]
-    unit = potential.space.units[{"height": "center_height"}.get(control, control)]
+    given, found, unit = float(getattr(start, control)), state.value_of(CONTROLS[control]), potential.space.units[control]
     return given if abs(found - given) <= 1e-9 * max(abs(given), unit) else float(found)
 
 
@@ -330,8 +351,8 @@ class _Walk:
     """From load to load under one control, with the memory that predicts the next state."""
 
     def __init__(self, potential: Potential, control: str, corrector: Corrector, start: Equilibrium | None) -> None:
-        self.potential, self.control_at, self.cold = potential, _CONTROLS[control], _STARTS[control]
-        self.quantity, self.corrector = control, corrector if control in _MINIMISED else correct
+        self.potential, self.control_at = potential, CONTROLS[control].at
+        self.quantity, self.corrector = control, corrector if CONTROLS[control].minimised else correct
         self.path = Path()
         self.state: State | None = None
         self.load = 0.0
@@ -437,7 +458,7 @@ class _Walk:
 
     def _first(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """The state of a cold start, and where its branch became unstable if it is one of another branch."""
-        guess = self.cold(self.potential, load, self.corrector is not correct)
+        guess = cold_start(self.potential, self.quantity, load, stable=self.corrector is not correct)
         result = self.corrector(self.potential, self.control_at(load), guess.x, guess.pressure)
         if (
             result.status in (Status.NOT_CONVERGED, Status.NOT_A_MINIMUM)
@@ -469,7 +490,7 @@ class _Walk:
     def _turn(self, error: SolveError, load: float) -> _Turn:
         # next to a crossing of branches round-off lies along the other one; the last state that it did not touch has a tangent of its own
         last = next((s for s in reversed(error.result or []) if s.correction <= TOLERANCE), self.state)
-        if self.quantity not in _MINIMISED or last is None:
+        if not CONTROLS[self.quantity].minimised or last is None:
             return _Turn(Limit(None, None))
         return _Turn(beyond_limit(self.potential, last, self.quantity, load, self._stable(load), any_before=self.corrector is correct))
 
@@ -487,12 +508,12 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
         return record(scene, potential, start_in_gas(potential, gas), clock=clock, gas=gas)
     state = resume(potential, start)
     # the amount that holds the state at hand is known: march from it to the wanted one
-    held = (state.pressure + gas.atmosphere) * (state.volume + gas.chamber)
+    held = state.value_of(gas)
     if held <= 0 or state.volume <= -gas.chamber:
         raise SolveError(
             "the start does not compress the gas (P + atmosphere <= 0); start at a larger volume", status=Status.NO_EQUILIBRIUM
         )
     if held != gas.amount:
-        state = march(potential, state, lambda amount: replace(gas, amount=amount), held, gas.amount)[-1]
+        state = march(potential, state, gas.at, held, gas.amount)[-1]
     refuse_unresolved(potential, state)
     return record(scene, potential, state, clock=clock, gas=gas)

@@ -10,8 +10,8 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import brentq
 
-from ..errors import FemmembraneError, InputError, SolveError, Status, unknown_name
-from ..physics.checks import number
+from ..checks import choice, number
+from ..errors import FemmembraneError, InputError, SolveError, Status
 from ..results.records import Branch, Equilibrium, SpecialPoint
 from ..scene import Analysis, Scene
 from .follow import equilibrium, run
@@ -86,14 +86,13 @@ def compute(scene: Scene, quantity: str, options: Options) -> Row:
 
 def check(scene: Scene, quantity: str, options: Options) -> None:
     """Raise InputError for a quantity that is unknown, or that this scene with these options has not."""
-    if not isinstance(quantity, str) or quantity not in QUANTITIES:
-        raise unknown_name("quantity", str(quantity), QUANTITIES)
+    choice("quantity", quantity, QUANTITIES)
     given = {name: value for name, value in (("pressure", options.pressure), ("volume", options.volume)) if value is not None}
     if quantity == "equilibria":
         if len(given) != 1:
             raise InputError("quantity", quantity, "it takes exactly one of pressure and volume, such as pressure=1.8")
         ((name, load),) = given.items()
-        number(name, load, "a finite number is allowed")
+        number(name, load)
     elif given:
         raise InputError(*next(iter(given.items())), 'only quantity = "equilibria" takes a load; others take that of [run]')
     traced = quantity in TRACED

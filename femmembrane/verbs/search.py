@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
-from ..physics.checks import number
+from ..checks import number, only
 from ..potential import potential_of
 from ..results.records import Equilibrium
 from ..scene import Scene
@@ -78,11 +77,8 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     InputError
     """
     check_scene(scene)
-    given = {k: v for k, v in (("pressure", pressure), ("volume", volume)) if v is not None}
-    if len(given) != 1:
-        raise InputError("equilibria", sorted(given), "exactly one of pressure and volume is allowed")
-    ((control, load),) = given.items()
-    load = number(control, load, "a finite number is allowed")
+    control, load = only("equilibria", {"pressure": pressure, "volume": volume}, "exactly one of pressure and volume is allowed")
+    load = number(control, load)
     check_max_steps(max_steps)
     potential = potential_of(scene)
     search = Search(potential, control, load, max_steps)

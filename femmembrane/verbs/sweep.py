@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..checks import whole
 from ..discretization.meridian import side
 from ..errors import InputError
 from ..memory import require
@@ -23,8 +24,8 @@ from ..results.grid import MEANING, dataset_of, load_dataset, save_dataset
 from ..results.kept import Kept
 from ..results.store import scene_text
 from ..scene import Scene
+from ..scene.keys import MAX_SCENES, set_key
 from . import pool
-from .keys import MAX_SCENES, set_key
 from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
 
 if TYPE_CHECKING:
@@ -353,12 +354,10 @@ def _workers(workers: Any, scheduler: Any) -> int | None:
         return None
     if scheduler is not None:
         raise InputError("workers", workers, "not together with scheduler: a cluster has its own")
-    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or not 1 <= workers <= pool.MAX_WORKERS:
-        raise InputError(
-            "workers", workers, f"a whole number from 1 to {pool.MAX_WORKERS} is allowed; this process may use {pool.cores()} cores"
-        )
-    require("workers", int(workers) - 1, pool.WORKER_BYTES, "more processes")
-    return int(workers)
+    allowed = f"a whole number from 1 to {pool.MAX_WORKERS} is allowed; this process may use {pool.cores()} cores"
+    number = whole("workers", workers, allowed, most=pool.MAX_WORKERS)
+    require("workers", number - 1, pool.WORKER_BYTES, "more processes")
+    return number
 
 
 def _computed(tasks: Iterator[pool.Task], workers: int | None, scheduler: str | None) -> Iterator[tuple[str, Row]]:

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, SolveError, Status, unknown_name
-from ..physics.checks import is_number, number
+from ..checks import choice, is_number, number, sign
+from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
@@ -193,8 +193,7 @@ def _begin(
     max_steps: int,
     ill_posed: str,
 ) -> _Tracing:
-    if direction not in (1, -1):
-        raise InputError("direction", direction, "1 (towards larger volume) or -1 is allowed")
+    direction = sign("direction", direction, "1 (towards larger volume) or -1 is allowed")
     check_ill_posed(ill_posed)
     check_max_steps(max_steps)
     return _Tracing.begin(scene, start, direction, steps or StepControl(), special_points, on_step, int(max_steps))
@@ -205,9 +204,8 @@ def _targets(until: Mapping[str, float] | None) -> dict[str, float]:
         raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
     targets = dict(until or {})
     for quantity, value in targets.items():
-        if quantity not in QUANTITIES:
-            raise unknown_name("until", quantity, QUANTITIES)
-        targets[quantity] = number(f"until.{quantity}", value, "a finite number is allowed")
+        choice("until", quantity, QUANTITIES)
+        targets[quantity] = number(f"until.{quantity}", value)
     return targets
 
 

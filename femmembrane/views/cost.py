@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..solve.controls import CONTROLS
 from .backend import title_text
 from .plots import new_figure, save_figure
 
@@ -68,7 +69,7 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
     entries = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     look: dict[str, Any] = {"ncols": 4 if len(starts) > 1 else 2, "frameon": False, "fontsize": 8.5, "handlelength": 3.4}
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", **look)
-    symbol = {"volume": "V", "pressure": "P", "center_height": "pole height"}[study.control]
+    symbol = CONTROLS[study.control].symbol
     title = f"{title_text(study.scene.title)}, " if study.scene.title else ""
     figure.suptitle(f"{title}{symbol} = {study.load:.6g}", fontsize=11, wrap=True, parse_math=False)
     return save_figure(figure, path)

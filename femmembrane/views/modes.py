@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..checks import number, whole
 from ..errors import InputError
 from ..results.store import replace_file
 from ..stability.verdict import Verdict
@@ -74,8 +75,7 @@ def write_mode_vtk(
         When the name does not end in ``.pvd`` or the folder cannot be written to; for too few frames, an amplitude that is no number, a
         verdict that has no mode, or a mode of another mesh.
     """
-    if isinstance(frames, bool) or not isinstance(frames, (int, np.integer)) or frames < 2:
-        raise InputError("frames", frames, "a whole number >= 2 is allowed")
+    frames = whole("frames", frames, least=2)
     surface = ModeSurface(equilibrium, mode, amplitude)
     length = shown_length(equilibrium)
     return write_collection(path, frames, lambda k, file: _write_frame(surface, float(np.cos(2 * np.pi * k / frames)), length, file))
@@ -129,10 +129,8 @@ class ModeSurface:
         self.revolution = Revolution.of_membrane(equilibrium, profile["r"], max(sectors, _PER_WAVE * self.n))
         self.rest = self.revolution.vectors(self.rho, self.eta)
         unit = _displacements(self.revolution, shape, self.n)
-        if amplitude is None:
-            amplitude = SHOWN * self.extent / 2 / np.linalg.norm(unit, axis=1).max()
-        elif not np.isfinite(amplitude):
-            raise InputError("amplitude", amplitude, "a finite number is allowed")
+        shown = SHOWN * self.extent / 2 / np.linalg.norm(unit, axis=1).max()
+        amplitude = shown if amplitude is None else number("amplitude", amplitude)
         self.displacement = amplitude * unit
 
     @cached_property

@@ -214,7 +214,7 @@ class _Page:
             return ""
         found = {name: self.branch.column(f"error_{name}") for name in names}
         figure = self._figure(_error_curves(self.branch, found), "Estimated relative errors along the branch")
-        note = f"Relative errors of the discretisation, at the same {held}, from the same load in a finer space"
+        note = f"Relative errors of the discretisation, at the same {held.replace('_', ' ')}, from the same load in a finer space"
         rows = [[name, *_largest(errors)] for name, errors in found.items()]
         return _beside(figure, table(["of", "median", "largest", "there", "without an estimate"], rows, caption=note))
 

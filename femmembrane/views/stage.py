@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..checks import whole
 from ..physics.outline import Outline
 
 if TYPE_CHECKING:
@@ -106,9 +106,8 @@ def place_of(step: int | None, count: int) -> int:
     """
     if step is None:
         return count - 1
-    if isinstance(step, bool) or not isinstance(step, (int, np.integer)) or not -count <= step < count:
-        raise InputError("step", step, f"a whole number from {-count} to {count - 1} is allowed: negative ones count from the end")
-    return int(step) % count
+    allowed = f"a whole number from {-count} to {count - 1} is allowed: negative ones count from the end"
+    return whole("step", step, allowed, least=-count, most=count - 1) % count
 
 
 def _cut(body: Outline, box: Box) -> Outline:

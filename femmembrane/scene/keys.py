@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import LARGEST
 from ..errors import InputError
-from ..physics.checks import LARGEST
 
 #: scenes of a sweep: each is checked and has a key before the first is computed
 MAX_SCENES = 10**5

@@ -28,7 +28,7 @@ from ..errors import InputError, unknown_name
 from ..physics.materials import Ogden
 
 if TYPE_CHECKING:
-    from ..scene import Scene
+    from .value import Scene
 
 #: added to a strength, so that its square root can be differentiated at zero; no strength above 1e-284 notices
 _TINY = 1e-300

@@ -1,0 +1,295 @@
+"""Scenes to and from tables: what a scene file holds.
+
+A scene file has one table for each part; the keys of a table are the arguments of a class, or attributes of :class:`.Scene`::
+
+    title                        Scene.title
+    [material]  model, ...       a class of MATERIALS and its arguments
+    [membrane]                   attributes of Scene, listed in SCENE_KEYS
+    [[source]]  kind, ...        a class of SOURCES and its arguments
+    [[load]]    kind, ...        a class of LOADS and its arguments
+    [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
+                file, ...        or a mesh file and what else FILE_KEYS lists; the scene keeps its points
+    [effects]                    attributes of Scene that are on or off
+    [run]                        Run
+    [analysis]                   Analysis
+    [scales]                     Scales
+
+A new model, source, load or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
+Values are checked where the objects are made, so that files and Python code meet the same errors, named by their key in a file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..checks import choice, sequence
+from ..discretization.meridian import Disc, Meridian
+from ..discretization.mesh_files import Curve, read_meridian
+from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
+from ..errors import InputError, unknown_name
+from ..physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
+from ..physics.loads import HubForce, Hydrostatic, Weight
+from ..physics.magnetics import Dipole
+from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
+from ..physics.scales import Scales
+from ..physics.sources import Loop, Solenoid, Uniform, Wire
+from ..physics.tabulated import Tabulated
+from .analysis import Analysis
+from .run import Run
+
+if TYPE_CHECKING:
+    from .value import Scene
+
+MATERIALS: dict[str, Any] = {
+    "arruda-boyce": ArrudaBoyce,
+    "fung": Fung,
+    "gent": Gent,
+    "mooney-rivlin": MooneyRivlin,
+    "neo-hookean": NeoHookean,
+    "ogden": Ogden,
+    "varga": Varga,
+    "yeoh": Yeoh,
+}
+SOURCES: dict[str, Any] = {
+    "dipole": Dipole,
+    "loop": Loop,
+    "solenoid": Solenoid,
+    "tabulated": Tabulated,
+    "uniform": Uniform,
+    "wire": Wire,
+}
+LOADS: dict[str, Any] = {"hub-force": HubForce, "hydrostatic": Hydrostatic, "weight": Weight}
+SHAPES: dict[str, Any] = {
+    "disc": Disc,
+    "annulus": Annulus,
+    "cap": Cap,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "torus": Torus,
+    "curve": Curve,
+}
+#: keys of [mesh] beside the file that holds the meridian
+FILE_KEYS = ("group", "divisions", "first", "last")
+SCENE_KEYS: dict[str, tuple[str, ...]] = {
+    "membrane": ("susceptibility", "radius_to_thickness"),
+    "mesh": ("degree",),
+    "effects": ("tension_field",),
+}
+#: size of a scene file: a million elements by their radii; what goes on for ever is none
+MAX_BYTES = 2**25
+#: where else an argument without a default may come from, for the message when it is missing
+_OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
+
+
+def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
+    """The tables of a scene file as they stand, unchecked: what :meth:`Scene.from_dict` takes.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or is no TOML (with the line).
+    """
+    from ..results.files import read_bytes
+
+    path = Path(path)
+    try:
+        data = read_bytes(path, MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise InputError("scene", str(path), f"larger than {MAX_BYTES} bytes; the path of a scene file (TOML) is allowed")
+        text = data.decode("utf-8-sig")
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a null character in the path
+        if isinstance(error, UnicodeDecodeError):
+            line = error.object.count(b"\n", 0, error.start) + 1
+            raise InputError("scene", str(path), f"not UTF-8 text (line {line}); a scene file (TOML, UTF-8) is allowed") from None
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError("scene", str(path), f"cannot be read ({reason}); the path of a scene file (TOML) is allowed") from None
+    try:
+        return tomllib.loads(text.replace("\r\n", "\n"))
+    except RecursionError:
+        raise InputError("scene", str(path), "not a scene file: nested too deeply") from None
+    except ValueError as error:
+        where = f"at line {text.rstrip().count(chr(10)) + 1}, the end of the file"
+        reason = re.sub("at end of document", where, str(error))
+        raise InputError("scene", str(path), f"not valid TOML: {reason}{_line(text, reason)}") from None
+
+
+def _line(text: str, reason: str) -> str:
+    """What stands in the line that a parser complains about."""
+    found = re.search(r"at line (\d+)", reason)
+    line = text.replace("\r\n", "\n").split("\n")[int(found[1]) - 1].strip() if found else ""
+    shown = "".join(c if c.isprintable() else "?" for c in line[:60]) + ("..." if len(line) > 60 else "")
+    return f": {shown}" if shown else ""
+
+
+def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The arguments of :class:`.Scene` from the tables of a scene file.
+
+    Parameters
+    ----------
+    data : mapping
+    folder : Path
+        Where the path of a mesh file starts from.
+
+    Raises
+    ------
+    InputError
+        For an unknown table or key (with the nearest valid name), a missing one, or a value that cannot be used.
+    """
+    if not isinstance(data, Mapping):
+        raise InputError("scene", data, "a mapping of the tables of a scene file is allowed")
+    _refuse_unknown("", data, ("title", *_known_keys()))
+    tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name not in ("source", "load")}
+    arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
+    for table in SCENE_KEYS.keys() - {"mesh"}:
+        _refuse_unknown(table, tables[table], SCENE_KEYS[table])
+    scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
+    return dict(
+        material=_build_one_of("material", "model", MATERIALS, tables["material"]),
+        sources=_build_list("source", SOURCES, data.get("source", ()), scales),
+        loads=_build_list("load", LOADS, data.get("load", ())),
+        mesh=_build_mesh(tables["mesh"], folder),
+        run=_build("run", Run, tables["run"]) if "run" in data else None,
+        analysis=_build("analysis", Analysis, tables["analysis"]),
+        title=data.get("title", ""),
+        scales=scales,
+        **arguments,
+    )
+
+
+def tables_of(scene: Scene) -> dict[str, Any]:
+    """A scene as the tables of a scene file, with plain values only.
+
+    Raises
+    ------
+    InputError
+        When a material, source, load or mesh has no name in scene files.
+    """
+    tables: dict[str, Any] = {
+        "title": scene.title,
+        "material": _describe("material", "model", MATERIALS, scene.material),
+        **{table: {name: getattr(scene, name) for name in names} for table, names in SCENE_KEYS.items() if table != "mesh"},
+        "source": [_describe("source", "kind", SOURCES, source) for source in scene.sources],
+        "load": [_describe("load", "kind", LOADS, load) for load in scene.loads],
+        "mesh": {**_describe("mesh", "shape", SHAPES, scene.mesh), **{name: getattr(scene, name) for name in SCENE_KEYS["mesh"]}},
+        "run": _arguments(scene.run) if scene.run else {},
+        "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
+        "scales": _arguments(scene.scales) if scene.scales else {},
+    }
+    tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
+    if scene.scales:  # which hold it already
+        del tables["membrane"]["radius_to_thickness"]
+    if scene.run and scene.run.control != "arc-length":
+        del tables["run"]["max_steps"]
+    if scene.run and scene.run.direction == 1:
+        del tables["run"]["direction"]
+    plain: dict[str, Any] = _plain(tables)
+    return {name: table for name, table in plain.items() if table not in ("", {}, [])}
+
+
+def _known_keys() -> dict[str, set[str]]:
+    """Keys of every table."""
+
+    def arguments(*classes: Any) -> set[str]:
+        return {f.name for c in classes for f in fields(c)}
+
+    keys = {table: set(names) for table, names in SCENE_KEYS.items()}
+    keys["material"] = {"model"} | arguments(*MATERIALS.values())
+    keys["source"] = {"kind"} | arguments(*SOURCES.values())
+    keys["load"] = {"kind"} | arguments(*LOADS.values())
+    keys["mesh"] |= {"shape", "file", *FILE_KEYS} | arguments(*SHAPES.values())
+    return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
+
+
+def _refuse_unknown(path: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
+    for name, value in table.items():
+        if name not in known:
+            key = f"{path}.{name}" if path else str(name)
+            homes = [f"[{home}]" for home, keys in sorted(_known_keys().items()) if name in keys and home != path.split("[")[0]]
+            hint = f"; {name} belongs in {' or '.join(homes)}" if homes else ""
+            raise InputError(key, value, unknown_name(key, name, known).allowed + hint)
+
+
+def _table(name: str, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(name, value, f"a table is allowed: [{name}] with its keys below")
+    return value
+
+
+def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
+    """The object of a class from a table with its arguments; ``beside`` are further keys of the table that others read."""
+    names = tuple(f.name for f in fields(cls))
+    _refuse_unknown(path, table, (*beside, *names))
+    for f in fields(cls):
+        if f.name not in table and f.default is f.default_factory is dataclasses.MISSING:
+            raise InputError(f"{path}.{f.name}", None, "missing; " + _OTHERWISE.get((cls, f.name), "it has no default"))
+    return cls(**{name: table[name] for name in names if name in table})
+
+
+def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
+    """The object of the class that a table names by its key ``selector``."""
+    if selector not in table:
+        raise InputError(f"{path}.{selector}", None, "missing; known: " + ", ".join(sorted(registry)))
+    choice(f"{path}.{selector}", table[selector], registry)
+    return _build(path, registry[table[selector]], table, (selector, *beside))
+
+
+def _build_mesh(table: Mapping[str, Any], folder: Path) -> Meridian:
+    if "file" not in table:
+        mesh: Meridian = _build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, beside=SCENE_KEYS["mesh"])
+        return mesh
+    _refuse_unknown("mesh", table, ("file", *FILE_KEYS, *SCENE_KEYS["mesh"]))
+    if not isinstance(table["file"], str):
+        raise InputError("mesh.file", table["file"], "the path of a mesh file is allowed, from the folder of the scene")
+    return read_meridian(folder / table["file"], **{name: table[name] for name in FILE_KEYS if name in table})
+
+
+def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Scales | None = None) -> tuple[Any, ...]:
+    if isinstance(tables, Mapping):
+        raise InputError(name, tables, f"a list of tables is allowed: write [[{name}]], one for each {name}")
+    tables = sequence(name, tables, f"a list of tables is allowed: [[{name}]], one for each {name}")
+    items = []
+    for k, table in enumerate(tables):
+        path = item_path(name, k, len(tables))
+        if not isinstance(table, Mapping):
+            raise InputError(path, table, f"a table is allowed: [[{name}]] with its keys below")
+        if table.get("kind") == "dipole" and scales is not None and scales.dipole_moment is not None:
+            table = {"strength": scales.strength, **table}  # only in place of one that is left out
+        try:
+            items.append(_build_one_of(path, "kind", registry, table))
+        except InputError as error:  # it does not know its place in the list
+            raise InputError(re.sub(rf"^{name}(?=\.)", path, error.key), error.value, error.allowed) from None
+    return tuple(items)
+
+
+def item_path(name: str, index: int, count: int) -> str:
+    """How messages call one entry of a list of tables: ``source``, or ``source[2]`` where there are several."""
+    return name if count == 1 else f"{name}[{index}]"
+
+
+def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any) -> dict[str, Any]:
+    for name, cls in registry.items():
+        if type(value) is cls:
+            return {selector: name, **_arguments(value)}
+    raise InputError(f"{path}.{selector}", value, "it has no name in scene files; known: " + ", ".join(sorted(registry)))
+
+
+def _arguments(value: Any) -> dict[str, Any]:
+    return {f.name: getattr(value, f.name) for f in fields(value)}
+
+
+def _plain(value: Any) -> Any:
+    """Lists, dictionaries and Python numbers only; what is not given is left out, for TOML has no null."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None and item != ()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,297 @@
+"""What exists and what is asked of it: one frozen value, and what its parts must agree on."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from ..checks import number, sequence, store, switch, whole
+from ..discretization.meridian import Meridian, disc
+from ..discretization.supports import as_support, floats
+from ..errors import InputError, unknown_name
+from ..memory import SMALL, require
+from ..physics.loads import Load, on_hubs
+from ..physics.magnetics import Source, distance_to_polyline
+from ..physics.materials import Material
+from ..physics.scales import AGREEMENT, Scales
+from .analysis import Analysis
+from .run import Run
+from .toml import item_path, read_tables, scene_arguments, tables_of
+
+MAX_DEGREE = 8
+#: characters of a title
+MAX_TEXT = 1000
+#: bytes that a computation takes for each element and degree at least, measured on 20000 elements: by Newton's method, and by IPOPT
+_BYTES, _BYTES_MINIMISED = 5000, 14000
+#: bytes that every equilibrium takes beside its state and profiles, and how many numbers these have at a node
+_BYTES_STEP, _PROFILES = 2000, 10
+_DEGREE = 2
+_RADIUS_TO_THICKNESS = 1000.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A membrane, its surroundings, its mesh and what is asked of it; hashable, never changed once made.
+
+    Parameters
+    ----------
+    material : Material
+        Strain energy: :class:`~femmembrane.physics.materials.Ogden`, ``NeoHookean``, or an object with their methods.
+    mesh : Meridian
+        Reference meridian and its elements.
+    degree : int
+        Polynomial degree of the elements, 1 to 8; left out: 2, or as chosen with a mesh for an accuracy (None until then).
+    sources : sequence of Source
+        Magnetic sources around the axis; none: nothing magnetic is built.
+    susceptibility : float, optional
+        Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
+    radius_to_thickness : float, optional
+        R0/T > 0; enters the total stresses only. Left out: that of the scales, or 1000 without scales.
+    tension_field : bool
+        Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
+    title : str
+    run : Run, optional
+        Equilibria that :func:`femmembrane.run` computes.
+    analysis : Analysis
+    scales : Scales, optional
+        Physical size and stiffness: stresses and pressures are then given in Pa as well. They change no equilibrium.
+    loads : sequence of Load
+        Loads besides the pressure, such as ``Hydrostatic(gamma=...)``; none: nothing of them is built.
+
+    Raises
+    ------
+    InputError
+        For a value that cannot be used, named by its key in a scene file (``mesh.elements``), and for scales that contradict
+        ``radius_to_thickness`` or hold the moment of no dipole.
+    """
+
+    material: Material
+    mesh: Meridian = field(default_factory=disc)
+    degree: int = None  # type: ignore[assignment]  # an int as soon as the scene has elements
+    sources: tuple[Source, ...] = ()
+    susceptibility: float | None = None
+    radius_to_thickness: float = None  # type: ignore[assignment]  # a float as soon as the scene is made
+    tension_field: bool = False
+    title: str = ""
+    run: Run | None = None
+    analysis: Analysis = field(default_factory=Analysis)
+    scales: Scales | None = None
+    loads: tuple[Load, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
+        _check_interface(
+            "mesh", self.mesh, ("breakpoints", "position", "tangent", "supports"), "a mesh is allowed, such as disc(elements=64)"
+        )
+        _check_interface("run", self.run, () if self.run is None else ("loads",), "a Run is allowed")
+        _check_interface("analysis", self.analysis, ("stability", "azimuthal_modes", "wrinkling"), "an Analysis is allowed")
+        sources = sequence("source", self.sources, "a list of sources is allowed, such as [Dipole(strength=..., height=...)]")
+        loads = sequence("load", self.loads, "a list of loads is allowed, such as [Weight(weight=...)]")
+        for k, load in enumerate(loads):
+            _check_interface(
+                item_path("load", k, len(loads)),
+                load,
+                ("over_reference", "over_projection", "on_hubs", "sees", "acts"),
+                "a load is allowed, such as Weight(weight=...)",
+            )
+        scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
+        _check_interface("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
+        store(
+            self,
+            degree=_degree("mesh.degree", self.degree, self.open),
+            sources=sources,
+            loads=loads,
+            susceptibility=_susceptibility("membrane.susceptibility", self.susceptibility),
+            radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
+            tension_field=switch("effects.tension_field", self.tension_field),
+            title=_text("title", self.title),
+        )
+        self._check_size()
+        self._check_sources()
+        self._check_hubs()
+
+    def _check_size(self) -> None:
+        """Refuse what there is no room for, before any of it is built."""
+        if self.open:
+            return
+        count, degree = self.mesh.elements, self.degree
+        run = self.run
+        minimised = run is not None and run.minimised
+        each = degree * (_BYTES_MINIMISED if minimised else _BYTES)
+        if count * each > SMALL:
+            require("mesh.elements", count, each, f"elements of degree {degree}")
+        steps = 0 if run is None else len(run.values or ()) or run.steps or 0
+        kept = 8 * (_PROFILES + 2) * count * degree + _BYTES_STEP
+        if steps * kept > SMALL:
+            require("run.steps" if run is not None and run.values is None else "run.values", steps, kept, "equilibria on this mesh")
+
+    def _check_sources(self) -> None:
+        R, Z = self.mesh.position(self.mesh.breakpoints())
+        for k, source in enumerate(self.sources):
+            path = item_path("source", k, len(self.sources))
+            allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
+            _check_interface(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "sees", "refusal"), allowed)
+            # the axis is met at the ends of a meridian only: its breakpoints are enough; circles may lie between them
+            with np.errstate(all="ignore"):
+                finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
+            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in source.circles)
+            if touched or not finite:
+                name, reason = source.refusal
+                if not touched and _too_far(source):
+                    reason = "the source is too far away for its field to be a number; move it"
+                raise InputError(f"{path}.{name}", getattr(source, name, source), reason)
+        if self.sources and self.susceptibility is None:
+            raise InputError(
+                "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"
+            )
+        if self.scales is not None and not self.scales.fits(self.sources):
+            raise InputError(
+                "scales.dipole_moment",
+                self.scales.dipole_moment,
+                f"no dipole of the scene has its strength, {self.scales.strength:.12g}, so it would do nothing; leave it out, or give a "
+                "dipole this strength (in a scene file: leave the strength of the dipole out)",
+            )
+
+    def _check_hubs(self) -> None:
+        """Every force on a hub has its hub, and is held."""
+        supports = [as_support(held) for held in self.mesh.supports()]
+        forces = on_hubs(self.loads, [end.rigid for end in supports])
+        if floats(supports) and sum(forces) and not any("along" in load.sees for load in self.loads if load.acts):
+            advice = "nothing holds the membrane against it along the axis; hold an end, or let the forces on its two hubs add up to 0"
+            raise InputError("load.force", sum(forces), advice)
+
+    @property
+    def open(self) -> bool:
+        """Whether the elements are still to be chosen, for the accuracy that is asked for: nothing can be computed before."""
+        return bool(getattr(self.mesh, "open", False))
+
+    def replace(self, **changes: Any) -> Self:
+        """The same scene with some attributes changed, checked anew.
+
+        With new scales ``radius_to_thickness`` follows them; a mesh that is still to be chosen drops the degree.
+        """
+        known = [f.name for f in fields(self)]
+        for name, value in changes.items():
+            if name not in known:
+                raise InputError(name, value, unknown_name(name, name, known).allowed)
+        if changes.get("scales") is not None:
+            changes.setdefault("radius_to_thickness", None)
+        if getattr(changes.get("mesh"), "open", False):
+            changes.setdefault("degree", None)
+        return dataclasses.replace(self, **changes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as nested dictionaries of plain values: the tables of a scene file.
+
+        Raises
+        ------
+        InputError
+            When a material, source or mesh has no name in scene files.
+        """
+        return tables_of(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], folder: str | PathLike[str] = ".") -> Self:
+        """The scene that the tables of a scene file describe.
+
+        Parameters
+        ----------
+        data : mapping
+        folder : path
+            Where the path of a mesh file starts from.
+
+        Raises
+        ------
+        InputError
+            For an unknown table or key (with the nearest valid name), a missing one, or a value that cannot be used.
+        """
+        return cls(**scene_arguments(data, Path(folder)))
+
+    @classmethod
+    def from_toml(cls, path: str | PathLike[str]) -> Self:
+        """Read a scene file.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be read, is no TOML (with the line), or does not describe a scene.
+        """
+        return cls.from_dict(read_tables(path), Path(path).parent)
+
+    def to_toml(self, path: str | PathLike[str]) -> None:
+        """Write a scene file that :meth:`from_toml` reads back to an equal scene.
+
+        Raises
+        ------
+        InputError
+            When a material, source or mesh has no name in scene files, or the file cannot be written.
+        """
+        import tomli_w
+
+        from ..results.store import replace_file
+
+        text = tomli_w.dumps(self.to_dict())
+        with replace_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _too_far(source: Source) -> bool:
+    """Whether a field that is not finite is that of a source beyond the range of numbers, not of one on the membrane."""
+    height = getattr(source, "height", 0.0)
+    return isinstance(height, float) and abs(height) > 1
+
+
+def _degree(key: str, value: Any, mesh_open: bool) -> int | None:
+    if mesh_open and value is not None:
+        raise InputError(key, value, "not allowed together with mesh.accuracy, for which the degree is chosen; leave one out")
+    return None if mesh_open else _DEGREE if value is None else whole(key, value, most=MAX_DEGREE)
+
+
+def _ratio(key: str, value: Any, scales: Scales | None) -> float:
+    """R0/T as given, or as it follows from the scales."""
+    if value is None:
+        return _RADIUS_TO_THICKNESS if scales is None else scales.radius_to_thickness
+    ratio = number(key, value, "a finite number > 0 is allowed (R0 over the reference thickness)", above=0)
+    if scales is None:
+        return ratio
+    if not math.isclose(ratio, scales.radius_to_thickness, rel_tol=AGREEMENT):
+        follows = f"scales.radius / scales.thickness = {scales.radius_to_thickness:.12g}"
+        advice = "leave radius_to_thickness out, and it follows from the scales (Scene.replace does so when it is given other scales)"
+        raise InputError(key, value, f"it contradicts {follows}; {advice}")
+    return scales.radius_to_thickness
+
+
+def _susceptibility(key: str, value: Any) -> float | None:
+    return None if value is None else number(key, value, "a finite number >= 0 is allowed (2.5 in the paper)", least=0)
+
+
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str) or not _encodes(value):
+        raise InputError(key, value, "a text (UTF-8) is allowed")
+    if len(value) > MAX_TEXT:
+        raise InputError(key, value, f"a text of up to {MAX_TEXT} characters is allowed; this one has {len(value)}")
+    if not all(c in "\t\n" or unicodedata.category(c) != "Cc" for c in value):
+        raise InputError(key, value, "a text without control characters is allowed (tabs and ends of lines are none)")
+    return value
+
+
+def _encodes(text: str) -> bool:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _check_interface(key: str, value: Any, names: tuple[str, ...], allowed: str) -> None:
+    # a class in place of its object (NeoHookean for NeoHookean()) has the methods, but nothing to call them on
+    if isinstance(value, type) or not all(hasattr(value, name) for name in names):
+        raise InputError(key, value, allowed)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import Status
+from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
-from .banded import BandFactor, BorderedFactor, CompiledBorder
 from .controls import ArcLengthControl, Control
 
 #: relative size of the Newton correction at which a state counts as converged
@@ -35,7 +35,7 @@ class NewtonResult:
     x: Array
     pressure: float
     evaluation: Evaluation
-    bordered: BorderedFactor | CompiledBorder | None
+    bordered: Border | None
     iterations: int
     correction: float
     residual: float
@@ -116,14 +116,14 @@ class Equations:
         x: Array,
         pressure: float,
         evaluation: Evaluation,
-        bordered: BorderedFactor | CompiledBorder | None = None,
+        bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
-        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.stiffness_density).all())
+        self.finite = evaluation.finite and -np.inf < pressure < np.inf
         if bordered is None and self.finite:
-            bordered = bordered_factor(evaluation, self._row, self._corner)
+            bordered = evaluation.border(self._row, self._corner)
         self.bordered = bordered
 
     @property
@@ -169,7 +169,7 @@ class Equations:
         return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, self.residual, self.gap, status)
 
     @property
-    def _factored(self) -> BorderedFactor | CompiledBorder:
+    def _factored(self) -> Border:
         if self.bordered is None:
             raise ArithmeticError("no factors where the energy is undefined")
         return self.bordered
@@ -177,14 +177,6 @@ class Equations:
     def simplified_step(self, force: Array, gap: float) -> Array:
         """The correction that the factors here give for residuals elsewhere."""
         return self._factored.solve(-force, -gap)[0]
-
-
-def bordered_factor(evaluation: Evaluation, row: Array, corner: float) -> BorderedFactor | CompiledBorder:
-    """Factors of K at a state with the column -V' and the row of a control."""
-    elements = evaluation.potential.elements
-    if elements is None:
-        return BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
-    return CompiledBorder(elements.border(evaluation.stiffness_density, evaluation.volume_gradient, row, corner))
 
 
 def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
@@ -197,7 +189,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
         x, pressure = equations.x + length * dx, equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
         force = new.gradient - pressure * new.volume_gradient
-        if np.isfinite(force).all():
+        if max(potential.largest(force)) < np.inf:
             gap = equations.control.equation(potential.space, x, pressure, new)[0]
             left = potential.largest(equations.simplified_step(force, gap))
             if max(c / unit if c else 0.0 for c, unit in zip(left, units, strict=True)) <= (1 - length / 2) * size:

@@ -44,7 +44,7 @@ class Evaluation:
 
     __slots__ = (
         *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient"),
-        *("potential", "elements", "factor", "_densities", "_band"),
+        *("potential", "elements", "factor", "_densities", "_band", "_negative"),
     )
 
     def __init__(
@@ -61,9 +61,10 @@ class Evaluation:
         factor: float,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.gradient, self.volume_gradient = gradients
+        self.gradient, self.volume_gradient = gradients[0], gradients[1]
         self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
         self._band: Array | None = None
+        self._negative: int | None = None
 
     @property
     def force_density(self) -> Array:
@@ -86,6 +87,13 @@ class Evaluation:
         if self._band is None:
             self._band = self.elements.assemble(self._densities[N_FORCE : N_FORCE + N_STIFFNESS])
         return self._band
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues of :attr:`band`: counted once, as two neighbouring steps of a branch ask for it."""
+        if self._negative is None:
+            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, None, 0.0)
+        return self._negative
 
     def border(self, row: Array, corner: float) -> Border:
         """Factors of :attr:`band` with the column -V' and the row of a control."""

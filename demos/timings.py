@@ -20,7 +20,7 @@ from contextlib import nullcontext
 import numpy as np
 
 import femmembrane as fm
-from femmembrane.native import in_numpy, native
+from femmembrane.kernels import in_numpy, kernels
 from femmembrane.potential import Potential
 from femmembrane.solve.controls import VolumeControl
 from femmembrane.solve.guess import spherical_dome
@@ -71,7 +71,7 @@ def run_table(repeat: int) -> dict[str, float]:
 def trace_table(repeat: int) -> dict[tuple[int, int], float]:
     """The same branch by arc length, compiled and in NumPy, and its error in P against a finer mesh at the same volume."""
     exact = fm.equilibrium(scene(64, 6), volume=75.4, solver="newton").pressure
-    halves = {"NumPy": in_numpy} if native() is None else {"compiled": nullcontext, "NumPy": in_numpy}
+    halves = {kernels().name: nullcontext, "NumPy": in_numpy}
     print(f"\nTraced by arc length, V = 0.35 to 75.4                {'points':>8} {'ms each':>8} {'+verdicts':>9} {'error in P':>11}")
     errors = {}
     for elements, degree in ((32, 2), (64, 2), (8, 6), (5, 6), (16, 4)):
@@ -138,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", help="not used: this demo only prints")
     quick = parser.parse_args(arguments).quick
     repeat = 1 if quick else 5
-    half = "NumPy alone" if native() is None else "compiled"
+    half = f"{kernels().name} kernels"
     print(f"{platform.processor() or platform.machine()}, {half}, Python {platform.python_version()}, NumPy {np.__version__}")
     fm.inflate(scene(16, stability=BOTH), volumes=[0.5, 1.0])  # imports and first-call costs are not counted
     run_table(repeat)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.potential import Potential, potential_of, vectorise
+from femmembrane.potential import Potential, potential_of
+from femmembrane.potential.replay import vectorise
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.minimize import nlp_functions
 
@@ -158,7 +159,7 @@ def test_vectorised_kernel_is_the_point_function(name):
     potential = potential_of(SCENES[name])
     function, data = potential.point_function, potential.point_data
     local = potential.space.at_quadrature(somewhere(potential)).reshape(4, -1)
-    found = potential._kernel(local, np.array([1.3, 0.8]))
+    found = potential._point.replay(local, np.array([1.3, 0.8]))
     for k in (0, 7, data.shape[1] - 1):
         assert found[:, k] == pytest.approx(np.array(function(data[:, k], local[:, k], [1.3, 0.8])).ravel(), rel=1e-14, abs=1e-300)
 
@@ -172,8 +173,8 @@ def test_kernel_in_blocks_is_the_kernel_in_one(elements):
     local = potential.space.at_quadrature(somewhere_smooth(potential)).reshape(4, n)
     parameters = np.array([1.3, 1.0])
     whole = vectorise(potential.point_function, n)(potential.point_data.T, local.T, parameters)
-    assert np.array_equal(potential._kernel(local, parameters), np.array(whole).T)
-    assert (potential._kernel.n_blocks > 1) == (n > 1024)
+    assert np.array_equal(potential._point.replay(local, parameters), np.array(whole).T)
+    assert (potential._point._replay.n_blocks > 1) == (n > 1024)
 
 
 def somewhere_smooth(potential):

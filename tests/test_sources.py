@@ -13,7 +13,8 @@ from femmembrane.accuracy.shooting import shoot
 from femmembrane.accuracy.strong_form import Guess
 from femmembrane.physics.magnetics import distance_to_polyline, magnetic_energy_density, magnetic_field, swept
 from femmembrane.physics.sources import loop_field
-from femmembrane.potential import Family, Potential, _casadi_answers_numpy, potential_of
+from femmembrane.potential import Family, Potential, potential_of
+from femmembrane.potential.expressions import casadi_answers_numpy
 from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.controls import PressureControl
 from femmembrane.solve.guess import spherical_dome
@@ -139,7 +140,7 @@ def test_no_divergence_and_no_curl(name, point):
 def test_casadi_differentiates_it_exactly(name):
     """Energy density and gradient against NumPy with a complex step; second derivatives against differences of the gradient."""
     y = ca.SX.sym("y", 2)
-    with _casadi_answers_numpy():
+    with casadi_answers_numpy():
         energy = magnetic_energy_density([ALL[name]], 2.5, y[0], y[1])
     hessian, gradient = ca.hessian(energy, y)
     function = ca.Function("f", [y], [ca.densify(ca.vertcat(energy, gradient, ca.vec(hessian)))])

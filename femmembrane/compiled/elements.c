@@ -347,22 +347,33 @@ static PyObject *elements_new(PyTypeObject *type, PyObject *args, PyObject *kwar
     return (PyObject *)s;
 }
 
-/* evaluate(x, parameters, gradients, densities): (elastic, magnetic, volume) */
+/* 1 if all are numbers */
+static int all_finite(const double *x, Py_ssize_t n)
+{
+    double sum = 0.0; /* x - x is 0 of a number, and no number otherwise */
+    for (Py_ssize_t i = 0; i < n; i++)
+        sum += x[i] - x[i];
+    return sum == 0.0;
+}
+
+/* evaluate(x, pressure, factor, gradients, densities): (elastic, magnetic, volume, whether gradients and second derivatives are numbers) */
 static PyObject *elements_evaluate(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
-    PyObject *o[4];
-    Py_buffer x = {0}, p = {0}, g = {0}, d = {0};
-    double values[3];
-    if (!PyArg_ParseTuple(args, "OOOO", &o[0], &o[1], &o[2], &o[3]))
+    PyObject *o[3], *whole = Py_False;
+    Py_buffer x = {0}, g = {0}, d = {0};
+    double values[3], parameters[2];
+    if (!PyArg_ParseTuple(args, "OddOO", &o[0], &parameters[0], &parameters[1], &o[1], &o[2]))
         return NULL;
-    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &p, 'd', 2, 0, "parameters") < 0 ||
-                    take_array(o[2], &g, 'd', 2 * s->n_free, 1, "gradients") < 0 ||
-                    take_array(o[3], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
-    if (!bad)
-        evaluate(s, x.buf, p.buf, values, g.buf, d.buf);
-    PyBuffer_Release(&x), PyBuffer_Release(&p), PyBuffer_Release(&g), PyBuffer_Release(&d);
-    return bad ? NULL : Py_BuildValue("(ddd)", values[0], values[1], values[2]);
+    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &g, 'd', 2 * s->n_free, 1, "gradients") < 0 ||
+                    take_array(o[2], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
+    if (!bad) {
+        const double *stiffness = (double *)d.buf + N_FORCE * s->n_points;
+        evaluate(s, x.buf, parameters, values, g.buf, d.buf);
+        whole = all_finite(g.buf, 2 * s->n_free) && all_finite(stiffness, N_STIFF * s->n_points) ? Py_True : Py_False;
+    }
+    PyBuffer_Release(&x), PyBuffer_Release(&g), PyBuffer_Release(&d);
+    return bad ? NULL : Py_BuildValue("(dddO)", values[0], values[1], values[2], whole);
 }
 
 /* at_quadrature(x, out): (u, u_x, w, w_x) at the quadrature points, shape (4, n_points) */

@@ -101,13 +101,19 @@ static int shifted(const Pencil *p, double shift, Border *b)
     return 0;
 }
 
+typedef struct {
+    int iterations;
+    double converged, shrinking, rounding; /* residuals that end the iterations */
+    double gap, noise, floor;              /* how far below the eigenvalue inertia looks for others */
+} Tolerances;
+
 /* 1 and value, error and the number of eigenvalues clearly below (-1: not certain); 0 when nothing was found, -1 without memory */
-static int rayleigh(const Pencil *p, double *mode, int iterations, double gap, Border *b, double *work, double *value, double *error, int *below)
+static int rayleigh(const Pencil *p, double *mode, const Tolerances *t, Border *b, double *work, double *value, double *error, int *below)
 {
     const int n = p->n, kd = p->kd, step = p->step;
     const double *k_lower = p->band + 2 * kd, *m_lower = p->mass + 2 * kd;
     double *right = work, *force = right + n, *residual = force + n, best = HUGE_VAL;
-    for (int iteration = 0; iteration < iterations; iteration++) {
+    for (int iteration = 0; iteration < t->iterations; iteration++) {
         project(p, mode);
         int largest = 0;
         for (int i = 1; i < n; i++)
@@ -132,10 +138,10 @@ static int rayleigh(const Pencil *p, double *mode, int iterations, double gap, B
             residual[i] = force[i] - *value * right[i];
         project(p, residual);
         *error = size_of(p, residual);
-        int converged = *error <= 1e-7 * fabs(*value);
-        if (!converged && *error > 0.5 * best) {
+        int converged = *error <= t->converged * fabs(*value);
+        if (!converged && *error > t->shrinking * best) {
             band_product(k_lower, step, n, kd, mode, force, 1);
-            converged = *error <= 1e-14 * size_of(p, force);
+            converged = *error <= t->rounding * size_of(p, force);
         }
         if (converged) {
             double scale = 0.0, noise = 0.0;
@@ -144,7 +150,7 @@ static int rayleigh(const Pencil *p, double *mode, int iterations, double gap, B
                 noise += fabs(mode[i]) * force[i];
                 scale = fmax(scale, fabs(k_lower[(size_t)i * step] / m_lower[(size_t)i * step]));
             }
-            *below = count_below(p, *value - fmax(fmax(gap * fabs(*value), 1e-12 * noise), 1e-24 * scale), &b->factor, force);
+            *below = count_below(p, *value - fmax(fmax(t->gap * fabs(*value), t->noise * noise), t->floor * scale), &b->factor, force);
             return 1;
         }
         best = fmin(best, *error);
@@ -206,16 +212,19 @@ PyObject *inertia_function(PyObject *module, PyObject *args)
     return answer;
 }
 
-/* rayleigh(band, mass, constraint or None, n, kd, compliance, mode, iterations, gap): (value, error, below) with the mode in place, or None */
+/* rayleigh(band, mass, constraint or None, n, kd, compliance, mode, tolerances in their order): (value, error, below) with the
+ * mode in place, or None */
 PyObject *rayleigh_function(PyObject *module, PyObject *args)
 {
     Pencil p;
     PyObject *o[3], *guess, *answer = NULL;
     Py_buffer views[3] = {{0}}, mode = {0};
-    double value, error, gap;
-    int iterations, below;
+    double value, error;
+    Tolerances t;
+    int below;
     (void)module;
-    if (!PyArg_ParseTuple(args, "OOOiidOid", &o[0], &o[1], &o[2], &p.n, &p.kd, &p.compliance, &guess, &iterations, &gap))
+    if (!PyArg_ParseTuple(args, "OOOiidOidddddd", &o[0], &o[1], &o[2], &p.n, &p.kd, &p.compliance, &guess, &t.iterations, &t.converged, &t.shrinking,
+                          &t.rounding, &t.gap, &t.noise, &t.floor))
         return NULL;
     if (o[1] == Py_None) {
         PyErr_SetString(PyExc_ValueError, "mass: a band matrix is required");
@@ -226,7 +235,7 @@ PyObject *rayleigh_function(PyObject *module, PyObject *args)
         double *work = malloc(sizeof(double) * 3 * p.n);
         int found = -1;
         if (border_init(&b, p.n, p.kd) == 0 && work != NULL)
-            found = rayleigh(&p, mode.buf, iterations, gap, &b, work, &value, &error, &below);
+            found = rayleigh(&p, mode.buf, &t, &b, work, &value, &error, &below);
         border_free(&b);
         free(work);
         if (found < 0)

@@ -446,8 +446,11 @@ class Space:
             At the reference radii :attr:`kink_radii`.
         """
         at_rest, slope, per_length, rest_kinks, poles = self._ends_of_elements
-        local, n = self.extend(x)[self.gather], self.degree + 1
-        y = (slope @ (local[:n] + 1j * local[n:])) * per_length + at_rest
+        local = self.extend(x)[self.gather].reshape(2, self.degree + 1, -1)
+        y = np.empty(at_rest.shape, dtype=complex)
+        y.real, y.imag = slope @ local
+        y *= per_length
+        y += at_rest
         size = np.abs(y)
         jumps = np.empty(rest_kinks.size)
         inner = self.n_elements - 1

@@ -6,7 +6,7 @@ import platform
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..native import native
+from ..kernels import kernels
 from .store import package_version
 
 #: distributions whose versions are noted
@@ -26,7 +26,7 @@ def processor() -> str:
 def origin() -> dict[str, str]:
     """All that the last digits of a result depend on, beside the scene."""
     return {
-        "half": "NumPy" if native() is None else "compiled",
+        "half": kernels().name,
         "processor": processor(),
         "system": f"{platform.system()} {platform.machine()}",
         **{name: package_version(name) for name in NOTED_VERSIONS},

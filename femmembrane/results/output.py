@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, NotWrittenError, Status
-from ..native import native
+from ..kernels import kernels
 from .files import RECORD, RUN_FILES, SURFACES_FOLDER, read_bytes, refuse_obstacles
 from .origin import NOTED_VERSIONS
 from .store import package_version, reason, replace_file, save
@@ -187,7 +187,7 @@ def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any
         "equilibria": len(branch),
         "special_points": None if branch.special_points is None else len(branch.special_points),
         "timings": {stage: float(seconds) for stage, seconds in branch.timings.items()},
-        "compiled": native() is not None if not len(branch) else branch[0].potential.elements is not None,
+        "compiled": (branch[0].potential.elements if len(branch) else kernels()).name == "compiled",
         "versions": {"python": platform.python_version(), **{name: package_version(name) for name in NOTED_VERSIONS}},
         "platform": platform.platform(),
         "processors": os.cpu_count(),

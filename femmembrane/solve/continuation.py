@@ -151,9 +151,7 @@ def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> Br
 
 def unit_point(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
     """The point of a state whose tangent is known up to its length."""
-    dual, dual_pressure = _dual(potential, tangent, tp)
-    size = math.sqrt(tangent @ dual + tp * dual_pressure)
-    # not the dual over the size, which differs in the last bit: a resumed trace knows the unit tangent alone
+    size = math.sqrt(_square(potential, tangent, tp))
     return oriented_point(potential, state, sigma, tangent / size, tp / size)
 
 

@@ -16,7 +16,9 @@ import numpy as np
 
 from ..discretization.space import HESSIAN_PAIRS
 from ..errors import Status
-from ..potential import BUILDING, Array, Evaluation, Potential, vectorise
+from ..potential import Array, Evaluation, Potential
+from ..potential.expressions import BUILDING
+from ..potential.replay import vectorise
 from ..threads import Guard
 from .banded import negative_directions
 from .controls import Control, PressureControl, VolumeControl

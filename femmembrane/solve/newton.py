@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import Status
+from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
-from .banded import BandFactor, BorderedFactor, CompiledBorder
 from .controls import ArcLengthControl, Control
 
 #: relative size of the Newton correction at which a state counts as converged
@@ -20,6 +21,7 @@ RESIDUAL = 1e-12
 ROUND_OFF, SOFT = 2e-14, 1e-4
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
+_EPSILON = float(np.finfo(float).eps)
 #: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
 PRESSURE = 1e-9
 
@@ -35,7 +37,7 @@ class NewtonResult:
     x: Array
     pressure: float
     evaluation: Evaluation
-    bordered: BorderedFactor | CompiledBorder | None
+    bordered: Border | None
     iterations: int
     correction: float
     residual: float
@@ -73,6 +75,7 @@ def correct(
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
         foretold from two corrections in quadratic convergence and confirmed by the residual at x and its correction by the factors before.
     """
+    x = np.ascontiguousarray(x, dtype=float)
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration, unbalance = np.inf, 0, np.inf
     while True:
@@ -91,7 +94,7 @@ def correct(
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
-        x, pressure = x + length * dx, pressure + length * dp
+        x, pressure = (x + dx, pressure + dp) if length == 1 else (x + length * dx, pressure + length * dp)
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
         # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x and the correction that the
@@ -107,7 +110,12 @@ def correct(
 
 
 class Equations:
-    """Residuals and bordered factors at one state."""
+    """Residuals and bordered factors at one state; ``unbalanced`` is P V' - E'."""
+
+    __slots__ = (
+        *("potential", "control", "x", "pressure", "evaluation", "bordered"),
+        *("unbalanced", "gap", "finite", "_row", "_corner", "_scales"),
+    )
 
     def __init__(
         self,
@@ -116,15 +124,14 @@ class Equations:
         x: Array,
         pressure: float,
         evaluation: Evaluation,
-        bordered: BorderedFactor | CompiledBorder | None = None,
+        bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        self.force = evaluation.gradient - pressure * evaluation.volume_gradient
+        self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
-        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.stiffness_density).all())
-        if bordered is None and self.finite:
-            bordered = bordered_factor(evaluation, self._row, self._corner)
-        self.bordered = bordered
+        self.finite = evaluation.finite and math.isfinite(pressure)
+        self.bordered = evaluation.border(self._row, self._corner) if bordered is None and self.finite else bordered
+        self._scales: tuple[float, float] | None = None
 
     @property
     def on_control(self) -> bool:
@@ -140,51 +147,53 @@ class Equations:
         return self.residual <= ROUND_OFF * self.potential.space.slenderness and self.on_control
 
     @property
+    def scales(self) -> tuple[float, float]:
+        """The forces that meet at a node, largest along u and along w."""
+        if self._scales is None:
+            self._scales = self.potential.force_scale(self.evaluation, self.pressure)
+        return self._scales
+
+    @property
     def residual(self) -> float:
-        return relative_residual(self.potential, self.force, self.evaluation, self.pressure)
+        """The larger of :meth:`residuals`; infinite where it is no number."""
+        worst = max(self.residuals())
+        return worst if worst < np.inf else np.inf
+
+    def residuals(self) -> tuple[float, float]:
+        return residuals_over(self.evaluation.elements.largest(self.unbalanced), self.scales)
 
     def balanced(self, dp: float) -> bool:
         """Whether a correction of P changes no force."""
-        scale = max(self.potential.force_scale(self.evaluation, self.pressure))
-        return bool(abs(dp) * max(self.potential.largest(self.evaluation.volume_gradient)) <= PRESSURE * scale)
+        return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
     def newton_step(self) -> tuple[Array, float]:
-        return self._factored.solve(-self.force, -self.gap)
+        return self._factored.solve(self.unbalanced, -self.gap)
 
     def size(self, dx: Array) -> float:
         """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""
-        change, size = self.potential.largest(dx), self.potential.largest(self.x)
-        parts = [c / max(s, c) if c else 0.0 for c, s in zip(change, size, strict=True)]
-        if max(change) < np.inf and max(parts) > TOLERANCE:
+        largest = self.evaluation.elements.largest
+        change, size = largest(dx), largest(self.x)
+        worst = _relative(change, size)
+        if TOLERANCE < worst < math.inf:
             small = NEGLIGIBLE * max(*size, *change)
-            if any(c and max(c, s) <= small for c, s in zip(change, size, strict=True)):
-                residual = relative_residuals(self.potential, self.force, self.evaluation, self.pressure)
-                parts = [
-                    0.0 if max(c, s) <= small and r <= RESIDUAL else part
-                    for c, s, r, part in zip(change, size, residual, parts, strict=True)
-                ]
-        return max(parts) if max(change) < np.inf else np.inf
+            negligible = [0 < c <= small and s <= small for c, s in zip(change, size, strict=True)]
+            if any(negligible):
+                kept = [0.0 if n and r <= RESIDUAL else c for n, r, c in zip(negligible, self.residuals(), change, strict=True)]
+                return _relative((kept[0], kept[1]), size)
+        return worst
 
     def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
         return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, self.residual, self.gap, status)
 
     @property
-    def _factored(self) -> BorderedFactor | CompiledBorder:
+    def _factored(self) -> Border:
         if self.bordered is None:
             raise ArithmeticError("no factors where the energy is undefined")
         return self.bordered
 
-    def simplified_step(self, force: Array, gap: float) -> Array:
+    def simplified_step(self, unbalanced: Array, gap: float) -> Array:
         """The correction that the factors here give for residuals elsewhere."""
-        return self._factored.solve(-force, -gap)[0]
-
-
-def bordered_factor(evaluation: Evaluation, row: Array, corner: float) -> BorderedFactor | CompiledBorder:
-    """Factors of K at a state with the column -V' and the row of a control."""
-    elements = evaluation.potential.elements
-    if elements is None:
-        return BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
-    return CompiledBorder(elements.border(evaluation.stiffness_density, evaluation.volume_gradient, row, corner))
+        return self._factored.solve(unbalanced, -gap)[0]
 
 
 def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
@@ -196,10 +205,10 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     while length > 1e-4:
         x, pressure = equations.x + length * dx, equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
-        force = new.gradient - pressure * new.volume_gradient
-        if np.isfinite(force).all():
+        unbalanced = pressure * new.volume_gradient - new.gradient
+        if max(potential.largest(unbalanced)) < np.inf:
             gap = equations.control.equation(potential.space, x, pressure, new)[0]
-            left = potential.largest(equations.simplified_step(force, gap))
+            left = potential.largest(equations.simplified_step(unbalanced, gap))
             if max(c / unit if c else 0.0 for c, unit in zip(left, units, strict=True)) <= (1 - length / 2) * size:
                 break
         length /= 2
@@ -208,21 +217,28 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
 
 def relative_size(potential: Potential, dx: Array, x: Array) -> float:
     """Largest change of u and of w, each relative to its own size: on a nearly flat membrane u is of order w^2."""
-    change, size = potential.largest(dx), potential.largest(x)
-    if not max(change) < np.inf:
-        return np.inf
-    return max(c / max(s, c) if c else 0.0 for c, s in zip(change, size, strict=True))
+    return _relative(potential.largest(dx), potential.largest(x))
 
 
-def relative_residuals(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> tuple[float, ...]:
+def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
+    """The larger of two changes relative to the sizes, or to themselves where they are larger; infinite where one is no number."""
+    (du, dw), (u, w) = change, size
+    if du == math.inf or dw == math.inf:
+        return math.inf
+    a = du / max(u, du) if du else 0.0
+    b = dw / max(w, dw) if dw else 0.0
+    return max(a, b)
+
+
+def residuals_over(size: tuple[float, float], scales: tuple[float, float]) -> tuple[float, float]:
     """Out-of-balance forces along u and along w over the forces that meet at a node."""
-    scales = potential.force_scale(evaluation, pressure)
     # where no force acts along one of them, what is there is round-off of the other
-    least = np.finfo(float).eps * max(scales)
-    return tuple(size / max(s, least) if size else 0.0 for size, s in zip(potential.largest(residual), scales, strict=True))
+    least = _EPSILON * max(scales)
+    u, w = (r / max(s, least) if r else 0.0 for r, s in zip(size, scales, strict=True))
+    return u, w
 
 
 def relative_residual(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> float:
-    """The larger of :func:`relative_residuals`; infinite where it is no number."""
-    worst = max(relative_residuals(potential, residual, evaluation, pressure))
+    """The larger out-of-balance force over the forces that meet at a node; infinite where it is no number."""
+    worst = max(residuals_over(potential.largest(residual), potential.force_scale(evaluation, pressure)))
     return worst if worst < np.inf else np.inf

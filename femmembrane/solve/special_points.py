@@ -15,7 +15,6 @@ from scipy.optimize import brentq
 
 from ..errors import SolveError, Status
 from ..potential import Potential
-from .banded import negative_directions
 from .continuation import BranchPoint, tangent_at, unit_point
 from .controls import CONTROLS, ArcLengthControl
 from .newton import TOLERANCE, correct
@@ -214,7 +213,7 @@ def branches_crossing(segment: Segment) -> int:
     if any(ill_posed(segment.potential, point.state.evaluation) for point in (segment.a, segment.b)):
         signs = [point.state.factor.determinant_sign() for point in (segment.a, segment.b)]
         return int((signs[0] != signs[1]) != (turns % 2 == 1))
-    before, after = (_negative(segment.potential, point) for point in (segment.a, segment.b))
+    before, after = (point.state.evaluation.negative for point in (segment.a, segment.b))
     surplus = abs(after - before) - turns
     return surplus if surplus > 0 else surplus % 2
 
@@ -254,8 +253,3 @@ def _bordered_sign(point: BranchPoint) -> int:
     evaluation = point.state.evaluation
     solved = point.state.factor.solve(evaluation.volume_gradient)
     return point.state.factor.determinant_sign() * (1 if point.dual_pressure + point.dual @ solved > 0 else -1)
-
-
-def _negative(potential: Potential, point: BranchPoint) -> int:
-    """Number of negative eigenvalues of K."""
-    return negative_directions(point.state.evaluation.band, potential.space.half_bandwidth)

@@ -15,15 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from ..native import native
+from ..kernels import kernels
+from ..kernels.interface import Rayleigh
 from ..potential import Array
 from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
 from ..threads import cached_property
 
-#: a gap below the eigenvalue found, relative to it, in which inertia must find nothing
-_GAP = 1e-4
-#: Rayleigh quotient iterations before Lanczos iterations are tried
-_ITERATIONS = 8
+#: of Rayleigh quotient iterations, before Lanczos iterations are tried
+_TOLERANCES = Rayleigh()
 
 
 @dataclass(frozen=True)
@@ -152,21 +151,11 @@ class Pencil:
 
     def proved(self, guess: Array) -> tuple[float, Array, float] | None:
         """What :meth:`rayleigh` finds from a guess, if nothing lies below."""
-        module = native() if self.banded else None
-        if module is None:
-            found = self.rayleigh(guess)
-            return None if found is None or self.below(*found[:2]) > 0 else found
-        mode = np.array(guess, dtype=float)
-        band, mass = np.ascontiguousarray(self.band.T), np.ascontiguousarray(self.mass.T)
-        answer = module.rayleigh(band, mass, self.constraint, self.n, self.kd, self.compliance, mode, _ITERATIONS, _GAP)
-        if answer is None:
-            return None
-        value, error, below = answer  # below is negative where the signs of pivots are in doubt
-        return None if below > 0 or (below < 0 and self.below(value, mode) > 0) else (value, mode, error)
+        return kernels().rayleigh(self, guess, _TOLERANCES)
 
-    def rayleigh(self, mode: Array, iterations: int = _ITERATIONS) -> tuple[float, Array, float] | None:
+    def rayleigh(self, mode: Array, tolerances: Rayleigh = _TOLERANCES) -> tuple[float, Array, float] | None:
         best = np.inf
-        for _ in range(iterations):
+        for _ in range(tolerances.iterations):
             mode = self.projected(mode)
             if not mode.any():  # a guess along the constraint says nothing
                 return None
@@ -174,7 +163,9 @@ class Pencil:
             value, error = self.quotient(mode, right)
             # an absolute floor alone would stop too early on a nearly flat membrane, whose modes are decades softer than the scale
             # the error of the value is of second order in that of the mode
-            if error <= 1e-7 * abs(value) or (error > 0.5 * best and error <= 1e-14 * self.noise(mode)[1]):
+            if error <= tolerances.converged * abs(value) or (
+                error > tolerances.shrinking * best and error <= tolerances.rounding * self.noise(mode)[1]
+            ):
                 return value, mode, error
             best = min(best, error)
             mode = self.solve(self.shifted_solver(value), right)
@@ -205,7 +196,8 @@ class Pencil:
     def below(self, value: float, mode: Array) -> int:
         """Number of eigenvalues clearly below that of a mode, by inertia."""
         # the flat unloaded disc has no stiffness to cancel: there it takes a shift of any size to tell zero from negative
-        shift = value - max(_GAP * abs(value), 1e-12 * self.noise(mode)[0], 1e-24 * self.scale)
+        t = _TOLERANCES
+        shift = value - max(t.gap * abs(value), t.noise * self.noise(mode)[0], t.floor * self.scale)
         return self.count(shift)
 
     def count(self, shift: float) -> int:

@@ -21,7 +21,7 @@ from ..accuracy.cost import Course, Job, Measurement, Outcome, Reference
 from ..accuracy.strong_form import StrongForm, prescribed
 from ..checks import is_number, is_whole
 from ..errors import InputError, SolveError, unknown_name
-from ..native import native
+from ..kernels import kernels
 from ..potential import potential_of
 from ..results.origin import NOTED_VERSIONS, processor
 from ..results.records import Branch, Equilibrium
@@ -265,7 +265,7 @@ def machine() -> dict[str, str]:
         "system": f"{platform.system()} {platform.machine()}",
         "python": f"Python {platform.python_version()}",
         **{name: f"{name} {package_version(name)}" for name in NOTED_VERSIONS},
-        "compiled": "NumPy" if native() is None else "compiled",
+        "compiled": kernels().name,
     }
 
 

@@ -139,9 +139,9 @@ def _version() -> str:
     import scipy
 
     from .. import __version__
-    from ..native import native
+    from ..kernels import kernels
 
-    half = "compiled" if native() else "in NumPy"
+    half = f"{kernels().name} kernels"
     return f"{__version__} ({half}, NumPy {np.__version__}, SciPy {scipy.__version__}, {platform.machine()})"
 
 

@@ -183,7 +183,7 @@ def test_repeated_runs_are_identical(solver):
 
 def test_repeated_runs_are_identical_from_cold():
     """Also when the potential is built anew."""
-    from femmembrane import potential
+    from femmembrane.potential import potential
 
     scene = disc_scene(dipole=BELOW, elements=16)
     first = fm.equilibrium(scene, volume=6.0)

@@ -1,0 +1,16 @@
+"""The total potential of a scene on its finite-element space, with exact derivatives; CasADi stays in here.
+
+- :mod:`.expressions`: the densities at a point, as CasADi expressions of the terms that the scene has
+- :mod:`.replay`: the instructions of such a function, on whole vectors of points
+- :mod:`.potential`: values and derivatives at a state
+- :mod:`.family`: the potential of scenes that differ in one number
+- :mod:`.strain_energy`: strain energies of one's own
+"""
+
+from ..kernels.interface import Array as Array
+from .family import Family as Family
+from .family import FoldDerivatives as FoldDerivatives
+from .potential import Evaluation as Evaluation
+from .potential import Potential as Potential
+from .potential import potential_of as potential_of
+from .strain_energy import StrainEnergy as StrainEnergy

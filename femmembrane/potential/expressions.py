@@ -1,0 +1,111 @@
+"""What is integrated, at one point: CasADi expressions in the local variables (u, u_x, w, w_x).
+
+Only the terms that the scene has are written down::
+
+    E = Int W(e_1, e_2) R dS + [Int -chi/2 |h|^2 R dS] + [loads],       V = Int rho rho_x eta dx,       both with the 2 pi
+
+(where an end is not held in the plane z = 0, V is closed by flat lids, :mod:`..physics.loads`.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+
+from ..discretization.space import Space
+from ..physics.kinematics import hencky_strains
+from ..physics.loads import Load, hub_density, lidded_volume_density, over_projection, over_reference, volume_density, wall_density
+from ..physics.magnetics import Source, magnetic_energy_density
+from ..physics.tension_field import strain_energy
+from ..threads import Guard
+
+if TYPE_CHECKING:
+    from ..physics.materials import Material
+    from ..scene import Scene
+
+#: held while expressions are built: CasADi has one mode for all threads that says what a product of symbols is
+BUILDING = Guard()
+
+
+@contextmanager
+def casadi_answers_numpy() -> Iterator[None]:
+    """Let NumPy's ufuncs act on CasADi symbols here without changing the caller's setting; to be used under :data:`BUILDING`."""
+    before = ca.GlobalOptions.getNumpyMode()
+    ca.GlobalOptions.setNumpyMode(1)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setNumpyMode(before)
+
+
+def point_expressions(
+    scene: Scene,
+    sources: Sequence[Source],
+    loads: Sequence[Load],
+    columns: Sequence[str],
+    space: Space,
+    forces: tuple[Any, Any] | None,
+) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
+    """Symbols (data, local, parameters) and the weighted densities with their gradients at one point; what is no column of data is 0."""
+    data = ca.SX.sym("data", len(columns))
+    local = ca.SX.sym("local", 4)
+    parameters = ca.SX.sym("parameters", 2)
+    flat = "Z" not in columns
+    R, R_x, weight, Z, Z_x = (data[columns.index(c)] if c in columns else ca.SX(0) for c in ("R", "R_x", "weight", "Z", "Z_x"))
+    u, u_x, w, w_x = (local[k] for k in range(4))
+    e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
+    area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
+    material = strain_energy(scene.material, scene.tension_field)
+    stress, tangent = response_expressions(material, ca.vertcat(e1, e2))
+    # the chain rule through closed-form stresses keeps the digits that differentiating the energy would lose at small strain, and
+    # written out it takes half the operations of differentiating the composition
+    slopes = ca.jacobian(ca.vertcat(e1, e2), local)
+    gradient = area * ca.mtimes(slopes.T, stress)
+    bending = sum((stress[k] * ca.jacobian(slopes[k, :].T, local) for k in range(2)), ca.SX(4, 4))
+    hessian = area * (ca.mtimes([slopes.T, tangent, slopes]) + bending)
+    enclosed = lidded_volume_density(R + u, Z_x + w_x) if space.lids else volume_density(R + u, R_x + u_x, Z + w)
+    if "wall" in columns:
+        enclosed = enclosed + wall_density(data[columns.index("wall")], data[columns.index("wall_x")], w, w_x)
+    inside = weight if space.side > 0 else -weight
+    volume = inside * enclosed
+    magnetic = ca.SX(0)
+    if sources and scene.susceptibility:
+        magnetic = area * magnetic_energy_density(sources, scene.susceptibility, R + u, Z + w)
+        magnetic = parameters[1] * magnetic
+        second, first = ca.hessian(magnetic, local)
+        gradient, hessian = gradient + first, hessian + second
+    load = ca.SX(0)
+    if loads:
+        load = area * over_reference(loads, R + u, Z + w) + inside * (R + u) * (R_x + u_x) * over_projection(loads, Z + w)[0]
+        if forces is not None:
+            hub, hub_x = (data[columns.index(c)] for c in ("hub", "hub_x"))
+            load += weight / (2 * math.pi) * hub_density(forces, hub, hub_x, Z + w, Z_x + w_x)
+        load = parameters[1] * load
+        second, first = ca.hessian(load, local)
+        gradient, hessian = gradient + first, hessian + second
+    return (data, local, parameters), {
+        "elastic": area * material.energy(e1, e2),
+        "magnetic": magnetic,
+        "load": load,
+        "volume": volume,
+        "gradient": gradient,
+        "hessian": hessian,
+        "volume_gradient": ca.gradient(volume, local),
+        "stress": stress,
+    }
+
+
+def response_expressions(material: Material, strains: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Principal stresses, shape (2, 1), and their derivative with respect to the Hencky strains, shape (2, 2)."""
+    e1, e2 = strains[0], strains[1]
+    s11, s12, s22 = material.tangent(e1, e2)
+    return ca.vertcat(*material.stress(e1, e2)), ca.vertcat(ca.horzcat(s11, s12), ca.horzcat(s12, s22))
+
+
+def point_rows(symbols: list[ca.SX], rows: list[ca.SX]) -> ca.Function:
+    return ca.Function("point_rows", symbols, [ca.densify(ca.vertcat(*rows))], {"cse": True})

@@ -1,0 +1,334 @@
+"""The total potential of a scene on its finite-element space.
+
+CasADi differentiates the densities at a point twice. Assembly is a constant linear map of the values at the points
+(:mod:`..discretization.space`), the same for the Newton corrector (NumPy arrays, banded) and for IPOPT (CasADi functions, sparse).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
+from ..errors import InputError
+from ..kernels import kernels
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements
+from ..physics.loads import Load, on_hubs, over_reference
+from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
+from ..physics.tension_field import strain_energy
+from ..threads import cached_property
+from .expressions import BUILDING, casadi_answers_numpy, point_expressions, point_rows, response_expressions
+from .replay import PointProgram, Replay, at_points
+
+if TYPE_CHECKING:
+    from ..physics.materials import Material
+    from ..scene import Scene
+
+
+class Evaluation:
+    """Value, gradient and Hessian of E and V at one state x; energies and volume with the 2 pi.
+
+    Attributes
+    ----------
+    elastic_energy, magnetic_energy, volume : float
+    gradient, volume_gradient : ndarray, shape (n_free,)
+    finite : bool
+        Whether all derivatives are numbers: outside the domain of the energy they are not.
+    elements : Elements
+        The kernels that answered.
+    """
+
+    __slots__ = (
+        *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient"),
+        *("potential", "elements", "factor", "_densities", "_band", "_negative"),
+    )
+
+    def __init__(
+        self,
+        x: Array,
+        elastic_energy: float,
+        magnetic_energy: float,
+        volume: float,
+        finite: bool,
+        gradients: Array,
+        densities: Array,
+        potential: Potential,
+        elements: Elements,
+        factor: float,
+    ) -> None:
+        self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
+        self.gradient, self.volume_gradient = gradients[0], gradients[1]
+        self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
+        self._band: Array | None = None
+        self._negative: int | None = None
+
+    @property
+    def force_density(self) -> Array:
+        """What was integrated to the two gradients, shape (8, n_points): for judging a residual."""
+        return self._densities[:N_FORCE]
+
+    @property
+    def stiffness_density(self) -> Array:
+        """What :attr:`band` integrates, shape (10 n_quadrature, n_elements)."""
+        return self._densities[N_FORCE : N_FORCE + N_STIFFNESS].reshape(-1, self.potential.space.n_elements)
+
+    @property
+    def stress(self) -> Array:
+        """Principal mechanical stresses at the quadrature points, shape (2, n_points)."""
+        return self._densities[N_FORCE + N_STIFFNESS :]
+
+    @property
+    def band(self) -> Array:
+        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
+        if self._band is None:
+            self._band = self.elements.assemble(self._densities[N_FORCE : N_FORCE + N_STIFFNESS])
+        return self._band
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues of :attr:`band`: counted once, as two neighbouring steps of a branch ask for it."""
+        if self._negative is None:
+            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, None, 0.0)
+        return self._negative
+
+    def border(self, row: Array, corner: float) -> Border:
+        """Factors of :attr:`band` with the column -V' and the row of a control."""
+        return self.elements.border(self._densities[N_FORCE : N_FORCE + N_STIFFNESS], self.volume_gradient, row, corner)
+
+    @property
+    def load_energy(self) -> float:
+        """Energy of the loads at x: computed only when asked for, as no solver needs it."""
+        return self.potential.load_energy(self.x, self.factor)
+
+    @property
+    def energy(self) -> float:
+        return self.elastic_energy + self.magnetic_energy + self.load_energy
+
+
+class Potential:
+    """Discrete potential of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    quadrature : int, optional
+        Polynomial degree integrated exactly; default 2 degree + 1.
+    """
+
+    @BUILDING
+    def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
+        self.scene = scene
+        fixed = anchored(scene)
+        self.space = space_of(scene.mesh, scene.degree, fixed) if quadrature is None else Space(scene.mesh, scene.degree, quadrature, fixed)
+        space = self.space
+        if not space.n_free:
+            advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
+            raise InputError("mesh.elements", space.n_elements, advice)
+        self.sources = acting_sources(scene.sources, scene.susceptibility)  # nothing is built of others
+        self.loads = tuple(load for load in scene.loads if load.acts)
+        if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
+            advice = (
+                "a liquid fills shapes that are closed by the plane z = 0 or by poles; leave it out, or choose such a shape and supports"
+            )
+            raise InputError("load", self.loads, advice)
+        pulled = any(type(load).on_hubs is not Load.on_hubs for load in self.loads)
+        forces = on_hubs(self.loads, [end.rigid for end in space.supports]) if pulled else None
+        self.flat = not (space.Z.any() or space.Z_x.any())
+        columns = {"R": space.R, "R_x": space.R_x, "weight": space.weights}
+        if not self.flat:
+            columns |= {"Z": space.Z, "Z_x": space.Z_x}
+        if space.wall is not None:
+            columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
+        if forces is not None:
+            columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
+        self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
+        with casadi_answers_numpy():
+            self.symbols, self.terms = point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
+        self.n_points = self.point_data.shape[1]
+        self._elements: dict[str, Elements] = {}  # of each implementation that was asked
+
+    @property
+    def surrounded(self) -> bool:
+        """Whether anything but the pressure acts on the membrane: without, the flat unloaded state is an equilibrium of no stiffness."""
+        return bool(self.sources or self.loads)
+
+    @property
+    def material(self) -> Material:
+        """The strain energy of the membrane: the scene's material, or its tension field."""
+        return strain_energy(self.scene.material, self.scene.tension_field)
+
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrix of the reference area in band storage, shape (3 kd + 1, n_free)."""
+        return self.space.mass_band()
+
+    @property
+    def area(self) -> float:
+        """Reference area of the membrane."""
+        return self.space.reference_area
+
+    @cached_property
+    def rigid(self) -> Array | None:
+        """Where the membrane can move along the axis as a whole: the mass times that motion, of mass one, shape (n_free, 1)."""
+        space = self.space
+        if space.pin is None:
+            return None
+        density = np.zeros((4, *space.R.shape))
+        density[2] = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        return space.assemble_vector(density.reshape(-1, space.n_elements))[:, None] / np.sqrt(self.area)
+
+    @cached_property
+    @BUILDING
+    def point_function(self) -> ca.Function:
+        """(data, local variables, (P, factor on sources and loads)) -> values, gradients and the Hessian at one point."""
+        t, (data, local, parameters) = self.terms, self.symbols
+        hessian = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local)
+        rows = [
+            t["elastic"],
+            t["magnetic"],
+            t["volume"],
+            t["gradient"],
+            t["volume_gradient"],
+            *(hessian[i, j] for i, j in HESSIAN_PAIRS),
+            t["stress"],
+        ]
+        return ca.Function("point", [data, local, parameters], [ca.densify(ca.vertcat(*rows))], {"cse": True})
+
+    @property
+    def operations(self) -> int:
+        """Number of elementary operations that one point costs: terms that the scene lacks do not appear."""
+        return int(self.point_function.n_instructions())
+
+    @property
+    def elements(self) -> Elements:
+        """The elements of this potential in the kernels in use."""
+        in_use = kernels()
+        return self._elements.get(in_use.name) or self._elements.setdefault(in_use.name, in_use.elements(self.space, self._point))
+
+    @cached_property
+    def _point(self) -> PointProgram:
+        return PointProgram(self.point_function, self.point_data)
+
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
+        elements = self.elements
+        return Evaluation(x, *elements.evaluate(np.ascontiguousarray(x, dtype=float), pressure, magnetic), self, elements, magnetic)
+
+    def load_energy(self, x: Array, factor: float = 1.0) -> float:
+        """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""
+        if not self.loads:
+            return 0.0
+        return float(self._load_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+
+    @cached_property
+    @BUILDING
+    def _load_kernel(self) -> Replay:
+        return Replay(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
+
+    def distance_to_sources(self, x: Array) -> float:
+        """Smallest distance of poles, hubs and quadrature points from a source; infinite without sources."""
+        if not self.sources:
+            return np.inf
+        space = self.space
+        u, _, w, _ = self.elements.at_quadrature(np.ascontiguousarray(x)).reshape(4, *space.R.shape)
+        rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
+        square = [s.distance_squared(rho, eta).min() for s in self.sources]
+        # a source all along the axis runs through hubs, and through a pole nowhere (a scene refuses it)
+        square += [s.distance_squared(0.0, pole) for s in self.sources if "along" in s.sees for pole in poles]
+        return math.sqrt(min(square))
+
+    def passed_source(self, before: Array, after: Array) -> bool:
+        """Whether the membrane went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
+        if not self.sources:
+            return False
+        heights = zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True)
+        if any(source.passed(*pair) for pair in heights for source in self.sources):
+            return True
+        circles = [circle for source in self.sources for circle in source.circles]
+        if not circles:
+            return False
+        meridians = [self._meridian(x) for x in (before, after)]
+        return any(swept(meridians[0], meridians[1], circle) for circle in circles)
+
+    def _meridian(self, x: Array) -> Array:
+        """Positions (rho, eta) of the nodes, shape (2, n)."""
+        s = self.space.node_parameters()
+        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.evaluate(x, s)
+        return np.stack([R + u, Z + w])
+
+    def largest(self, x: Array) -> tuple[float, float]:
+        """Largest sizes of a vector of unknowns among u and among w; infinite where there is no number."""
+        return self.elements.largest(np.ascontiguousarray(x))
+
+    def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, float]:
+        """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
+        return self.elements.force_scale(evaluation.force_density, pressure)
+
+    def response(self, e1: Array, e2: Array) -> Array:
+        """Principal mechanical stresses and their derivatives with respect to the Hencky strains.
+
+        Returns
+        -------
+        ndarray, shape (5, n)
+            s_1, s_2, ds_1/de_1, ds_1/de_2, ds_2/de_2 in units of mu.
+        """
+        return at_points(self._response_function, e1, e2)
+
+    @cached_property
+    @BUILDING
+    def _response_function(self) -> ca.Function:
+        e = ca.SX.sym("e", 2)
+        with casadi_answers_numpy():
+            stress, tangent = response_expressions(self.material, e)
+        return point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
+
+    def field_energy(self, rho: Array, eta: Array) -> Array:
+        """Energy density of sources and loads per reference area and its derivatives with respect to the position.
+
+        Returns
+        -------
+        ndarray, shape (6, n)
+            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources and loads.
+        """
+        if not self.surrounded:
+            return np.zeros((6, np.size(rho)))
+        return at_points(self._field_energy_function, rho, eta)
+
+    @cached_property
+    @BUILDING
+    def _field_energy_function(self) -> ca.Function:
+        y = ca.SX.sym("y", 2)
+        with casadi_answers_numpy():
+            density = over_reference(self.loads, y[0], y[1]) + ca.SX(0)
+            if self.sources:
+                density += magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
+        hessian, gradient = ca.hessian(density, y)
+        return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
+
+
+def potential_of(scene: Scene) -> Potential:
+    """The potential of a scene, built once: scenes that differ only in what is done with it share one.
+
+    Raises
+    ------
+    InputError
+        While the mesh of the scene is still to be chosen.
+    """
+    require_elements(scene)
+    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
+
+
+def require_elements(scene: Scene) -> None:
+    if scene.open:
+        accuracy = getattr(scene.mesh, "accuracy", None)
+        advice = "no mesh is chosen for it here; give elements and degree, or the scene of a branch from inflate, pressurize, trace or run"
+        raise InputError("mesh.accuracy", accuracy, advice)
+
+
+@lru_cache(maxsize=64)
+def _potential_of(scene: Scene) -> Potential:
+    return Potential(scene)

@@ -6,11 +6,11 @@ import pytest
 import femmembrane as fm
 from femmembrane.potential import potential_of
 from femmembrane.solve.controls import VolumeControl
-from femmembrane.solve.finer import transferred
+from femmembrane.solve.finer_space import transferred
 from femmembrane.solve.minimize import minimize
 from femmembrane.solve.newton import correct
 from femmembrane.solve.state import State
-from femmembrane.verbs.recording import record
+from femmembrane.verbs.state_records import record
 
 from .cases import OGDEN, disc_scene
 
@@ -66,7 +66,7 @@ def test_waves_as_short_as_an_element_do_not_pass_for_instability():
 def test_where_the_mesh_is_good_nothing_is_solved_again(volume, monkeypatch):
     """The values of degree 6 (recorded on 2026-11-28) stand as they are."""
     eq = fm.equilibrium(disc_scene(OGDEN, (200.0, 6.5), elements=64), volume=volume, solver="newton")
-    monkeypatch.setattr("femmembrane.stability.judge.counterpart", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr("femmembrane.stability.checked_verdict.counterpart", lambda *_: pytest.fail("solved again"))
     verdicts = [eq.verdict("pressure"), eq.verdict("volume"), *(eq.verdict(azimuthal=n) for n in (1, 2, 3))]
     assert all(verdict.error < 1e-5 for verdict in verdicts)
     fine = fm.equilibrium(disc_scene(OGDEN, (200.0, 6.5), elements=24, degree=6), volume=volume, solver="newton")

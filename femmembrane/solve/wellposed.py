@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
-from .finer import survives
+from .finer_space import survives
 from .state import State
 
 #: stress relative to the largest one that counts as none
@@ -82,7 +82,7 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
 def compressed(potential: Potential, evaluation: Evaluation, component: int) -> tuple[float, float] | None:
     """Smallest and largest reference radius at which a principal stress (0 meridional, 1 hoop) is compressive, on any mesh; None if none.
 
-    A compression that the mesh alone shows is left out, see :func:`.finer.survives`.
+    A compression that the mesh alone shows is left out, see :func:`.finer_space.survives`.
     """
     if not least_stress(evaluation, component):
         return None

@@ -45,8 +45,8 @@ from ..potential import Array, Evaluation, Potential
 from ..solve.banded import band_product
 from ..solve.wellposed import compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
-from .floating import pencil_of, rigid_part
-from .resolution import small_eigenvalue, unresolved
+from .mode_resolution import small_eigenvalue, unresolved
+from .rigid_motions import pencil_of, rigid_part
 from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
 from .verdict import Verdict, against, verdict_from
 
@@ -193,7 +193,7 @@ class AzimuthalOperator:
     density : ndarray, shape (18, n_quadrature, n_elements)
         What ``band`` integrates: second derivatives of the quadratic form at the points in the order of _PAIRS, times the weights.
     rigid : ndarray, shape (n_free, k), or None
-        Motions of the membrane as a whole that nothing resists, see :mod:`.floating`.
+        Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
     spin : ndarray, shape (n_free,), or None
         The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
     """
@@ -660,7 +660,7 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
 
 
 def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float:
-    """:func:`.resolution.unresolved` of a mode."""
+    """:func:`.mode_resolution.unresolved` of a mode."""
     layout = _layout(space, min(operator.n, 2))
     local = space.table[: 2 * space.n_quadrature, : space.degree + 1] @ layout.local(mode).reshape(3, space.degree + 1, -1)
     local = local.reshape(6, *space.R.shape)

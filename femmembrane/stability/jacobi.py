@@ -33,7 +33,7 @@ from ..errors import InputError, SolveError, Status, unknown_name
 from ..physics.loads import over_projection
 from ..potential import Array, Potential, potential_of
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
-from ..solve.finer import solved_in
+from ..solve.finer_space import solved_in
 from ..threads import one_thread
 from .azimuthal import LocalResponse, local_response
 

@@ -16,8 +16,8 @@ from ..discretization.space import Space
 from ..errors import InputError, unknown_name
 from ..potential import Evaluation, Potential
 from ..solve.wellposed import apparent, ill_posed
-from .floating import pencil_of
-from .resolution import unresolved_axisymmetric
+from .mode_resolution import unresolved_axisymmetric
+from .rigid_motions import pencil_of
 from .spectrum import SmallestEigenvalue, smallest_of
 
 Array = NDArray[np.float64]

@@ -29,7 +29,7 @@ from ..discretization.space import Space, space_of_scene
 from ..errors import unknown_name
 from ..potential import potential_of
 from ..scene import WRINKLING, Scene
-from ..solve.finer import survives
+from ..solve.finer_space import survives
 from ..solve.newton import NewtonResult
 from .profile import Profile, profile_at
 

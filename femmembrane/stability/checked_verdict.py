@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..scene import MAX_WAVES
-from ..solve.finer import counterpart, transferred
+from ..solve.finer_space import counterpart, transferred
 from .azimuthal import azimuthal_verdict, mode_in
-from .resolution import small_eigenvalue
+from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError
 from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
 
@@ -29,7 +29,7 @@ SAFETY = 3.0
 _ZERO = 0.1
 
 
-def judge(
+def checked_verdict(
     potential: Potential,
     x: Array,
     pressure: float,

@@ -55,7 +55,7 @@ def test_movie_of_a_branch(tmp_path: Path, capfd: pytest.CaptureFixture[str]) ->
 
 
 def test_a_mode_moves_and_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(show, "_PERIOD", 10)
+    monkeypatch.setattr(viewer, "_PERIOD", 10)
     fm.view(branch(), mode=1, step=0, movie=tmp_path / "a.gif", size=SMALL)
     found = frames(tmp_path / "a.gif")
     assert len(found) == 10

@@ -43,12 +43,12 @@ from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
 from ..solve.banded import band_product
-from ..solve.wellposed import compressed, ill_posed, interval, least_stress
+from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, least_stress
 from ..threads import one_thread
 from .mode_resolution import small_eigenvalue, unresolved
 from .rigid_motions import pencil_of, rigid_part
 from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
-from .verdict import Verdict, against, verdict_from
+from .verdict import Verdict, against, short_wave_verdict, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
@@ -648,9 +648,10 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     _check_waves(n, 1)
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(np.asarray(x, dtype=float), pressure)
-    wrinkles = short_waves(potential, operator, evaluation)
+    wrinkles = short_waves(potential, evaluation)
     if wrinkles:
-        return Verdict(False, np.nan, np.nan, None, operator.n, None, f"short-wave unstable (wrinkling): {wrinkles}")
+        where = "; ".join(wrinkle.where for wrinkle in wrinkles)
+        return short_wave_verdict(where, any(wrinkle.confirmed for wrinkle in wrinkles), None, operator.n)
     found = _smallest(operator, guess)
     shape = partial(azimuthal_shape, potential.space, operator.n)
     # compression that is the mesh's alone says that the mesh is not to be trusted
@@ -684,17 +685,27 @@ def mode_in(space: Space, n: int, mode: Array, onto: Space) -> Array:
     return coefficients[:-1]
 
 
-def short_waves(potential: Potential, operator: AzimuthalOperator, evaluation: Evaluation) -> str:
-    """Where ever shorter waves have ever lower eigenvalues at this n; empty if nowhere.
+@dataclass(frozen=True)
+class ShortWaves:
+    """Where in words ever shorter waves have ever lower eigenvalues, and whether more than one mesh says so."""
+
+    where: str
+    confirmed: bool
+
+
+def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves]:
+    """Where ever shorter waves with n >= 1 waves around the axis have ever lower eigenvalues; empty if nowhere.
 
     A principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails. In a tension field no stress is; there the
     meridional one may vanish, while without hoop stress the operator of one n is as good as any.
     """
     if potential.scene.tension_field:
-        return str(ill_posed(potential, evaluation) or "")
+        bad = ill_posed(potential, evaluation)
+        return [] if bad is None else [ShortWaves(str(bad), bad.confirmed)]
     found = []
     for component, (name, lines) in enumerate((("meridional", "circles"), ("hoop", "meridians"))):
         zone = compressed(potential, evaluation, component)
         if zone is not None:
-            found.append(f"{name} stress compressive at {interval(*zone)}: wrinkles along {lines}")
-    return "; ".join(found)
+            doubt = "" if zone.confirmed else f" ({UNCONFIRMED})"
+            found.append(ShortWaves(f"{name} stress compressive at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
+    return found

@@ -98,10 +98,10 @@ def natural_frequencies(
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(x, pressure)
     bad = ill_posed(potential, evaluation)
-    where = (
-        short_waves(potential, operator, evaluation) if operator.n else str(bad or "")
-    )  # a hoop stress sets no axisymmetric wave in motion
-    if where:
+    # a hoop stress sets no axisymmetric wave in motion
+    wrinkles = [wrinkle.where for wrinkle in short_waves(potential, evaluation)] if operator.n else [str(bad)] if bad else []
+    if wrinkles:
+        where = "; ".join(wrinkles)
         raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=bad.status if bad else Status.LEGENDRE_FAILURE)
     try:
         found = lowest_eigenvalues(potential, x, pressure, n, count, control)

@@ -14,7 +14,7 @@ from femmembrane.solve.banded import band_product
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.minimize import nlp_functions
 from femmembrane.solve.parameter import Parameter, names
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 
 from .cases import OGDEN, disc_scene
 

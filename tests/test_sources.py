@@ -18,7 +18,7 @@ from femmembrane.solve.controls import PressureControl
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.newton import correct
 from femmembrane.solve.parameter import Parameter, names
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 from femmembrane.stability.profile import profile_at
 from femmembrane.views import plots
 

@@ -12,10 +12,11 @@ from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..scene import MAX_WAVES
 from ..solve.finer_space import counterpart, transferred
-from .azimuthal import azimuthal_verdict, mode_in
+from .azimuthal import azimuthal_verdict
 from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError
 from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
+from .wave_unknowns import mode_in
 
 #: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once
 _CLEAR = 2.0

@@ -21,8 +21,10 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from ..solve.wellposed import ill_posed
-from .azimuthal import azimuthal_operator, azimuthal_shape, lowest_eigenvalues, short_waves
+from .azimuthal import lowest_eigenvalues, short_waves
+from .azimuthal_operator import azimuthal_operator
 from .spectrum import SpectrumError
+from .wave_unknowns import azimuthal_shape
 
 
 @dataclass(frozen=True, eq=False)

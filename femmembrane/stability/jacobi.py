@@ -35,7 +35,7 @@ from ..potential import Array, Potential, potential_of
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
 from ..solve.finer_space import solved_in
 from ..threads import one_thread
-from .azimuthal import LocalResponse, local_response
+from .second_variation import LocalResponse, local_response
 
 if TYPE_CHECKING:
     from ..results.records import Equilibrium

@@ -10,7 +10,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization.space import Space, band_of
+from ..discretization.numbering import band_of
+from ..discretization.space import Space
 from ..potential import Array
 from .second_variation import PAIRS, VALUES
 

@@ -30,7 +30,7 @@ import numpy as np
 
 import femmembrane as fm
 from femmembrane.results.store import replace_file
-from femmembrane.stability.judge import judge
+from femmembrane.stability.checked_verdict import checked_verdict
 
 SCENE = fm.Scene(
     material=fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0)),
@@ -57,7 +57,7 @@ def verdicts(branch: fm.Branch, warm: bool) -> tuple[dict[str, float], dict[str,
         for name, control, n in CLASSES:
             guess = found[name][-1].coefficients if warm and found[name] else None
             clock = time.perf_counter()
-            verdict = judge(eq.potential, eq.state, eq.pressure, evaluation, control, n, guess=guess)
+            verdict = checked_verdict(eq.potential, eq.state, eq.pressure, evaluation, control, n, guess=guess)
             times[name].append(1e3 * (time.perf_counter() - clock))
             found[name].append(verdict)
     return {name: statistics.median(values) for name, values in times.items()}, found

@@ -91,7 +91,7 @@ if TYPE_CHECKING:
     from .views.modes import render_mode as render_mode
     from .views.modes import write_mode_vtk as write_mode_vtk
     from .views.picture import render as render
-    from .views.show import view as view
+    from .views.viewer import view as view
 
 __version__ = "0.1.0"
 
@@ -144,7 +144,7 @@ _ROOMS = {
     "views.export": ("export",),
     "views.modes": ("render_mode", "write_mode_vtk"),
     "views.picture": ("render",),
-    "views.show": ("view",),
+    "views.viewer": ("view",),
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -168,7 +168,7 @@ def true_errors(branch: fm.Branch) -> list[float]:
     from femmembrane.potential import potential_of
     from femmembrane.solve.continuation import first_point
     from femmembrane.solve.controls import CenterHeightControl, VolumeControl
-    from femmembrane.solve.finer import met_across, solved_in
+    from femmembrane.solve.finer_space import met_across, solved_in
     from femmembrane.solve.state import State
 
     radii = branch.scene.mesh.breakpoints()

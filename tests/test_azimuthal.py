@@ -14,16 +14,11 @@ import femmembrane as fm
 from femmembrane.errors import InputError
 from femmembrane.potential import Potential, potential_of
 from femmembrane.solve.banded import band_product, negative_directions
-from femmembrane.stability.azimuthal import (
-    EQUAL_STRETCH,
-    azimuthal_eigenvalue,
-    azimuthal_operator,
-    azimuthal_shape,
-    azimuthal_verdict,
-    local_response,
-    lowest_eigenvalues,
-)
+from femmembrane.stability.azimuthal import azimuthal_eigenvalue, azimuthal_verdict, lowest_eigenvalues
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
+from femmembrane.stability.second_variation import EQUAL_STRETCH, local_response
 from femmembrane.stability.verdict import axisymmetric_verdict
+from femmembrane.stability.wave_unknowns import azimuthal_shape
 
 from .cases import OGDEN, POINTS, SCENES, Point, disc_scene
 

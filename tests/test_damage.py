@@ -21,7 +21,7 @@ import femmembrane as fm
 from femmembrane.cli import main
 from femmembrane.errors import InputError
 from femmembrane.results import checkpoint, files, origin, output, store
-from femmembrane.results.kept import Kept
+from femmembrane.results.finished_scenes import FinishedScenes
 
 from .damage import damaged
 
@@ -312,7 +312,7 @@ def test_a_broken_row_of_a_sweep_is_computed_again(scene, tmp_path):
     for broken in (row.replace("1", "2", 1), row[:-3], "", row.encode(), "{}", "[" * 10_000):
         with closing(sqlite3.connect(tmp_path / "o" / "scenes.sqlite")) as database, database:
             database.execute("UPDATE scene SET row = ? WHERE key = ?", (broken, key))
-        with Kept(tmp_path / "o" / "scenes.sqlite") as kept:
+        with FinishedScenes(tmp_path / "o" / "scenes.sqlite") as kept:
             assert kept.get(key) is None
     assert main(words) == 0
     after = fm.Sweep.load(tmp_path / "o" / "sweep.nc").to_xarray()

@@ -11,7 +11,7 @@ import femmembrane as fm
 from femmembrane.errors import InputError, SolveError, Status
 from femmembrane.potential import potential_of
 from femmembrane.solve.banded import BandFactor, band_product
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 from femmembrane.stability.frequencies import natural_frequencies
 
 from .cases import SCENES, disc_scene

@@ -15,7 +15,7 @@ from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.banded import band_product
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.minimize import nlp_functions
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 
 from .cases import OGDEN, disc_scene
 

@@ -6,11 +6,11 @@ import pytest
 import femmembrane as fm
 from femmembrane.potential import potential_of
 from femmembrane.solve.controls import VolumeControl
-from femmembrane.solve.finer import transferred
+from femmembrane.solve.finer_space import transferred
 from femmembrane.solve.minimize import minimize
 from femmembrane.solve.newton import correct
 from femmembrane.solve.state import State
-from femmembrane.verbs.recording import record
+from femmembrane.verbs.state_records import record
 
 from .cases import OGDEN, disc_scene
 
@@ -66,7 +66,7 @@ def test_waves_as_short_as_an_element_do_not_pass_for_instability():
 def test_where_the_mesh_is_good_nothing_is_solved_again(volume, monkeypatch):
     """The values of degree 6 (recorded on 2026-11-28) stand as they are."""
     eq = fm.equilibrium(disc_scene(OGDEN, (200.0, 6.5), elements=64), volume=volume, solver="newton")
-    monkeypatch.setattr("femmembrane.stability.judge.counterpart", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr("femmembrane.stability.checked_verdict.counterpart", lambda *_: pytest.fail("solved again"))
     verdicts = [eq.verdict("pressure"), eq.verdict("volume"), *(eq.verdict(azimuthal=n) for n in (1, 2, 3))]
     assert all(verdict.error < 1e-5 for verdict in verdicts)
     fine = fm.equilibrium(disc_scene(OGDEN, (200.0, 6.5), elements=24, degree=6), volume=volume, solver="newton")
@@ -136,6 +136,20 @@ def test_compression_that_only_the_mesh_shows(elements):
         assert "on this mesh alone" in verdict.reason
 
 
+def test_compression_that_finer_elements_neither_confirm_nor_deny():
+    """The state is not found on finer elements; on 96 of degree 6 the least meridional stress is +0.0087 (recorded on 2026-11-28)."""
+    source = fm.Dipole(434.33870144914, -3.9579317882994673)
+    mesh = fm.cylinder(1.5, 16, top="mirror")
+    scene = fm.Scene(material=fm.MooneyRivlin(0.5), sources=[source], susceptibility=1.0, mesh=mesh, degree=3)
+    eq = fm.equilibrium(scene, volume=5.215307802492517, solver="newton")
+    assert eq.potential.evaluate(eq.state, eq.pressure).stress[0].min() < -0.05
+    for verdict in (eq.verdict("pressure"), eq.verdict("volume"), eq.verdict(azimuthal=1)):
+        assert verdict.stable is None
+        assert np.isnan(verdict.smallest_eigenvalue)
+        assert verdict.reason.startswith("not confirmed: ")
+        assert "meridional stress is compressive" in verdict.reason or "meridional stress compressive" in verdict.reason
+
+
 @pytest.mark.parametrize("tension_field", [False, True])
 def test_a_slack_zone_that_only_the_mesh_shows(tension_field):
     """The true meridional stress at both ends is 0.081 (64 elements of degree 4, recorded on 2026-11-28)."""
@@ -144,10 +158,18 @@ def test_a_slack_zone_that_only_the_mesh_shows(tension_field):
 
 
 def test_true_compression_is_pronounced():
-    """At pole heights from 0.32 to 0.235 the continuum is compressed, see tests/hard_cases/slack.py."""
+    """Below this dipole the hoop stress of the continuum is compressive, see tests/hard_cases/slack.py."""
+    verdict = fm.equilibrium(disc_scene(OGDEN, (400.0, -3.25), elements=32), center_height=-0.1).verdict(azimuthal=1)
+    assert verdict.stable is False
+    assert verdict.reason.startswith("short-wave unstable (wrinkling): hoop stress compressive at r in [0.1")
+
+
+def test_a_branch_ends_at_compression_that_is_not_confirmed():
+    """By shooting the meridional tension vanishes at the pole height 0.3211, see tests/hard_cases/slack.py: here little of it is left."""
     scene = disc_scene(OGDEN, (600.0, -3.25), elements=64, degree=3)
     branch = fm.trace(scene, start=fm.equilibrium(scene, center_height=0.36), direction=-1, until={"center_height": 0.1}, throw=False)
     assert branch.status is fm.Status.LEGENDRE_FAILURE
-    assert 0.31 < branch[-1].center_height < 0.325
-    assert branch[-1].verdict("volume").reason.startswith("short-wave unstable")
-    assert branch[-1].verdict(azimuthal=1).reason.startswith("short-wave unstable")
+    assert 0.3211 < branch[-1].center_height < 0.325
+    for verdict in (branch[-1].verdict("volume"), branch[-1].verdict(azimuthal=1)):
+        assert verdict.stable is None
+        assert verdict.reason.startswith("not confirmed: ")

@@ -20,7 +20,7 @@ from femmembrane.potential import Family, Potential, potential_of
 from femmembrane.scene.variation import Parameter
 from femmembrane.solve.banded import band_product
 from femmembrane.solve.guess import guess_at_volume
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 
 from .cases import OGDEN, SUSCEPTIBILITY, disc_scene
 

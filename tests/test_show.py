@@ -14,7 +14,7 @@ import femmembrane as fm
 from femmembrane.cli import main
 from femmembrane.physics.outline import Outline
 from femmembrane.stability.zones import KINDS
-from femmembrane.views import movie, picture, show, stage
+from femmembrane.views import movie, picture, surroundings, viewer
 
 from .cases import disc_scene
 
@@ -55,7 +55,7 @@ def test_movie_of_a_branch(tmp_path: Path, capfd: pytest.CaptureFixture[str]) ->
 
 
 def test_a_mode_moves_and_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(show, "_PERIOD", 10)
+    monkeypatch.setattr(viewer, "_PERIOD", 10)
     fm.view(branch(), mode=1, step=0, movie=tmp_path / "a.gif", size=SMALL)
     found = frames(tmp_path / "a.gif")
     assert len(found) == 10
@@ -98,7 +98,7 @@ def test_colours_are_ordered_in_grey() -> None:
 def test_window() -> None:
     """The slider takes the membrane to a step, under the camera and colours of all."""
     with picture.new_plotter(SMALL) as plotter:
-        show.open_steps(plotter, list(branch()), "stretch_1", 2)
+        viewer.open_steps(plotter, list(branch()), "stretch_1", 2)
         (slider,) = getattr(plotter, "widgets", plotter).slider_widgets  # before pyvista 0.48 the plotter held them itself
         camera, limits = plotter.camera_position, plotter.actors["membrane"].mapper.scalar_range
         slider.GetRepresentation().SetValue(0.0)
@@ -119,7 +119,7 @@ class Stranger:
 
 def test_any_source_is_drawn_as_it_says() -> None:
     """A ring, a rod without ends and a coil stand where they say; one far away and one that does not say are named."""
-    box = stage.Box(1.0, 0.0, 2.0)
+    box = surroundings.Box(1.0, 0.0, 2.0)
     kinds = {
         "ring": (Stranger((0.5, 3.0)), (0.5, 3.0, 3.0)),
         "rod": (Stranger((0.0, -np.inf), (0.0, np.inf)), (0.0, -0.6, 2.6)),
@@ -130,18 +130,18 @@ def test_any_source_is_drawn_as_it_says() -> None:
             drawn = np.concatenate(picture.draw_surroundings(plotter, SimpleNamespace(sources=[source]), box))
         assert np.hypot(*drawn.T[:2]).max() == pytest.approx(radius, abs=0.05)
         assert (drawn[:, 2].min(), drawn[:, 2].max()) == pytest.approx((low, high), abs=0.05)
-    around = stage.surroundings(SimpleNamespace(sources=[Stranger(), Stranger((0.0, 9.0))]), box)
-    assert around == stage.Surroundings((), ("stranger", "stranger"))
-    dipole = stage.surroundings(branch().scene, box)
+    around = surroundings.surroundings(SimpleNamespace(sources=[Stranger(), Stranger((0.0, 9.0))]), box)
+    assert around == surroundings.Surroundings((), ("stranger", "stranger"))
+    dipole = surroundings.surroundings(branch().scene, box)
     assert dipole.near == (Outline("dipole at height 4.5", ((0.0, 4.5),), 1),)
 
 
 def test_clamped_ends_are_those_of_the_supports() -> None:
-    assert stage.clamped_ends(branch()[0], 17) == [(16, 1.0, 0.0)]
+    assert surroundings.clamped_ends(branch()[0], 17) == [(16, 1.0, 0.0)]
     balloon = fm.Scene(fm.NeoHookean(), fm.sphere(elements=4))
-    assert stage.clamped_ends(fm.equilibrium(balloon, volume=5.0), 17) == []
+    assert surroundings.clamped_ends(fm.equilibrium(balloon, volume=5.0), 17) == []
     tube = fm.Scene(fm.NeoHookean(), fm.cylinder(elements=4, length=2.0, top="hub"))
-    ends = stage.clamped_ends(fm.equilibrium(tube, volume=7.0), 17)
+    ends = surroundings.clamped_ends(fm.equilibrium(tube, volume=7.0), 17)
     assert [end for end, _, _ in ends] == [16]
 
 

@@ -19,7 +19,7 @@ from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.controls import PressureControl
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.newton import correct
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 from femmembrane.stability.profile import profile_at
 from femmembrane.views import plots
 

@@ -19,9 +19,9 @@ import pytest
 import femmembrane as fm
 from femmembrane.cli import main
 from femmembrane.errors import InputError
-from femmembrane.results.kept import Kept
+from femmembrane.results.finished_scenes import FinishedScenes
 from femmembrane.scene.keys import set_all, set_key, values_of
-from femmembrane.verbs import pool
+from femmembrane.verbs import parallel
 from femmembrane.verbs.quantities import QUANTITIES, UNEXPECTED, Options, Row, compute
 from femmembrane.verbs.sweep import KEPT
 
@@ -131,7 +131,7 @@ def test_values_in_place_of_those_of_a_file():
     ],
 )
 def test_what_cannot_be_swept_is_refused_before_anything_is_computed(over, options, key, monkeypatch):
-    monkeypatch.setattr(pool, "compute", None)
+    monkeypatch.setattr(parallel, "compute", None)
     with pytest.raises(InputError) as error:
         fm.sweep(below(), over, **({"workers": 1} | options if "scheduler" not in options else options))
     assert error.value.key.startswith(key)
@@ -247,7 +247,7 @@ def test_an_interrupted_sweep_goes_on(serial, tmp_path, monkeypatch):
     assert seen == [(2, 4), (3, 4), (4, 4)]
     assert same(resumed, serial)
     # all are kept, also for another grid with another title and another spelling of a number, and nothing at all is computed
-    monkeypatch.setattr(pool, "compute", None)
+    monkeypatch.setattr(parallel, "compute", None)
     part = fm.sweep(below().replace(title="other"), {STRENGTH: [300.0]}, direction=-1, out=tmp_path)
     assert float(part.to_xarray()["limit_pressure"][0, 0]) == float(serial.to_xarray()["limit_pressure"][1, 0, 0])
 
@@ -272,7 +272,7 @@ def test_what_a_row_depends_on_is_in_its_key(tmp_path, monkeypatch):
 
 
 def test_a_folder_belongs_to_one_sweep_at_a_time(tmp_path):
-    with Kept(tmp_path / "scenes.sqlite") as kept:
+    with FinishedScenes(tmp_path / "scenes.sqlite") as kept:
         kept.put("a", {"x": np.array([0.1, np.nan])})
         assert kept.get("a")["x"][0] == 0.1
         assert kept.get("b") is None
@@ -283,12 +283,12 @@ def test_a_folder_belongs_to_one_sweep_at_a_time(tmp_path):
         fm.sweep(below(), OVER, workers=1, out=tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="folder"):
-        Kept(tmp_path / "file" / "scenes.sqlite")
+        FinishedScenes(tmp_path / "file" / "scenes.sqlite")
 
 
 def test_no_more_scenes_are_under_way_than_there_is_room_for(monkeypatch):
     taken, finished = [], []
-    monkeypatch.setattr(pool, "compute", lambda scene, quantity, options: Row("converged", "", {}))
+    monkeypatch.setattr(parallel, "compute", lambda scene, quantity, options: Row("converged", "", {}))
 
     def tasks():
         for k in range(50):
@@ -297,7 +297,7 @@ def test_no_more_scenes_are_under_way_than_there_is_room_for(monkeypatch):
             yield str(k), None, "branch", Options()
 
     with ThreadPoolExecutor(2) as executor:
-        for key, _ in pool._drive(executor, tasks(), {}, lambda: 4):
+        for key, _ in parallel._drive(executor, tasks(), {}, lambda: 4):
             finished.append(key)
     assert sorted(finished, key=int) == [str(k) for k in range(50)]
 
@@ -338,8 +338,8 @@ def test_processes_one_of_which_is_killed(plain):
 def test_processes_are_started_for_what_is_left(plain, monkeypatch):
     counts = []
     monkeypatch.setattr("femmembrane.verbs.sweep._ALONE", 0.0)
-    monkeypatch.setattr(pool, "cores", lambda: 2)
-    monkeypatch.setattr(pool, "on_cores", lambda tasks, workers: counts.append(workers) or pool.here(tasks))
+    monkeypatch.setattr(parallel, "cores", lambda: 2)
+    monkeypatch.setattr(parallel, "on_cores", lambda tasks, workers: counts.append(workers) or parallel.here(tasks))
     assert same(fm.sweep(below(), wide(), direction=-1), plain)
     assert counts == [2]
     counts.clear()
@@ -381,7 +381,7 @@ def test_a_sweep_that_is_killed_leaves_no_process_and_goes_on(tmp_path):
     started.kill()
     started.wait()
     until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in processes))
-    with Kept(tmp_path / "out" / KEPT):
+    with FinishedScenes(tmp_path / "out" / KEPT):
         pass
     with closing(sqlite3.connect(tmp_path / "out" / KEPT)) as file:
         (count,) = file.execute("SELECT count(*) FROM scene").fetchone()

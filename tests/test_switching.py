@@ -13,7 +13,7 @@ from femmembrane.solve import switching
 from femmembrane.solve.continuation import BranchPoint, oriented_point
 from femmembrane.solve.special_points import Located, Segment
 from femmembrane.solve.switching import crossing_at, leave
-from femmembrane.verbs.recording import restore
+from femmembrane.verbs.state_records import restore
 
 from .cases import OGDEN, disc_scene
 

@@ -11,7 +11,7 @@ import femmembrane as fm
 from femmembrane.physics.tension_field import TensionField, natural_strains
 from femmembrane.potential import Potential, potential_of
 from femmembrane.solve.banded import band_product
-from femmembrane.stability.azimuthal import azimuthal_operator
+from femmembrane.stability.azimuthal_operator import azimuthal_operator
 from femmembrane.verbs.folds import fold_curve
 
 from .cases import OGDEN, disc_scene

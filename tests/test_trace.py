@@ -119,7 +119,9 @@ def test_trace_stops_where_the_legendre_condition_fails():
     last = branch[-1]
     assert last.status is fm.Status.LEGENDRE_FAILURE
     assert 0.30 < last.center_height < 0.335
-    assert last.verdict("volume").stable is False
+    # states depend on the mesh there: none is found on finer elements, which could confirm what this mesh shows
+    assert last.verdict("volume").stable is None
+    assert last.verdict("volume").reason.startswith("not confirmed: short-wave unstable")
     assert np.isnan(last.verdict("volume").smallest_eigenvalue)
     assert all(eq.status is fm.Status.CONVERGED for eq in branch[:-1])
     with pytest.raises(fm.SolveError, match="Legendre") as raised:

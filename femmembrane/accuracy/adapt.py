@@ -27,9 +27,9 @@ from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.continuation import first_point
 from ..solve.controls import CONTROLS
-from ..solve.finer import met_across, solved_in, transferred
-from ..solve.resolution import largest_kink
+from ..solve.finer_space import met_across, solved_in, transferred
 from ..solve.state import State
+from ..solve.state_resolution import largest_kink
 from ..solve.wellposed import ill_posed
 from .error_estimate import finer_space, same_state
 

@@ -20,7 +20,7 @@ from ..solve.controls import CONTROLS
 from ..solve.minimize import minimize_and_verify, nlp_functions
 from ..solve.newton import correct
 from ..solve.start import cold_start
-from ..solve.state import Path, State
+from ..solve.state import Predictor, State
 from ..solve.stepping import Corrector, march
 from ..stability.profile import profile_at
 from .collocation import collocate
@@ -278,7 +278,7 @@ class Course:
 
     def follow(self, potential: Potential, first: State) -> list[State]:
         """States at the three loads from one at the first."""
-        states, path = [first], Path()
+        states, path = [first], Predictor()
         for here, there in zip(self.loads[:-1], self.loads[1:], strict=True):
             states.append(march(potential, states[-1], self.control_at, here, there, path=path)[-1])
         return states
@@ -295,11 +295,11 @@ class Course:
             if result.status is not Status.CONVERGED:
                 raise SolveError("no equilibrium near the fine one was found on this mesh", status=result.status)
             first = State.of(result)
-        path = Path()
+        path = Predictor()
         here = march(potential, first, self.control_at, self.loads[0], self.loads[1], path=path)[-1]
 
         def again(solver: str, problem: Potential) -> State:
-            memory = Path(list(path.sigma), list(path.point), list(path.slope))
+            memory = Predictor(list(path.sigma), list(path.point), list(path.slope))
             states = march(problem, here, self.control_at, self.loads[1], self.load, path=memory, corrector=SOLVERS[solver])
             states[-1].iterations = sum(s.iterations for s in states)
             return states[-1]

@@ -18,10 +18,10 @@ from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.banded import negative_directions
 from ..solve.controls import CONTROLS, control_kind
-from ..solve.finer import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
+from ..solve.finer_space import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
-from ..solve.resolution import unresolved
 from ..solve.state import State
+from ..solve.state_resolution import unresolved
 from ..solve.wellposed import ill_posed
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import Verdict, axisymmetric_verdict

@@ -38,7 +38,7 @@ def view(
         GIF or MP4 file to write (MP4 with imageio[ffmpeg] installed).
     """
     from ..results.files import remove_leftovers
-    from ..views.show import view as show
+    from ..views.viewer import view as show
 
     for file in filter(None, (screenshot, movie)):
         remove_leftovers(file.parent)

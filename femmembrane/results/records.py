@@ -152,11 +152,11 @@ class Equilibrium:
 
     @one_thread
     def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
-        from ..stability.judge import judge
+        from ..stability.checked_verdict import checked_verdict
 
         evaluation = self.potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
-        return judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+        return checked_verdict(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:

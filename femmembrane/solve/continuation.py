@@ -17,7 +17,7 @@ from ..potential import Array, Potential
 from .banded import BorderedFactor, band_product
 from .controls import CONTROLS, ArcLengthControl, Controlled
 from .newton import correct
-from .state import Path, State, inner
+from .state import Predictor, State, inner
 
 #: smallest step relative to the arc length so far
 ROUND_OFF = 1e-14
@@ -68,7 +68,7 @@ class BranchPoint:
 class Tracer:
     """Where a trace stands: everything that its next step depends on."""
 
-    path: Path
+    path: Predictor
     step: float
     control: StepControl = field(default_factory=StepControl)
 

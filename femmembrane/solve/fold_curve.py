@@ -30,7 +30,7 @@ from ..potential import Array, Evaluation, Family, FoldDerivatives
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .continuation import StepControl
 from .newton import TOLERANCE, relative_residual, relative_size
-from .state import Path, hermite
+from .state import Predictor, hermite
 
 #: kinds of folds that can be followed
 KINDS = ("limit_point", "volume_fold")
@@ -231,7 +231,7 @@ class FoldTracer:
     """Where a fold curve stands: the memory that predicts, and the length of the next step."""
 
     control: StepControl
-    path: Path = field(default_factory=Path)
+    path: Predictor = field(default_factory=Predictor)
     step: float = 0.0
 
 
@@ -263,11 +263,11 @@ def fold_points(system: FoldSystem, point: FoldPoint, bounds: tuple[float, float
         yield new
 
 
-def _remember(path: Path, point: FoldPoint) -> None:
+def _remember(path: Predictor, point: FoldPoint) -> None:
     path.append(point.sigma, point.z[:-1], point.number, point.tangent[:-1], point.number_rate)
 
 
-def _predict(path: Path, sigma: float) -> Array:
+def _predict(path: Predictor, sigma: float) -> Array:
     return np.append(*path.predict(sigma))
 
 

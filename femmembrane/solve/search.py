@@ -14,10 +14,10 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import CONTROLS, Control, VolumeControl
 from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, relative_size
-from .resolution import unresolved
 from .special_points import FOLDS, Located, Segment, branch_points
 from .start import moderate, start_at_volume
-from .state import Path, State, at_rest, distance, flat_state
+from .state import Predictor, State, at_rest, distance, flat_state
+from .state_resolution import unresolved
 from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest
 from .wellposed import ill_posed, is_slack
 
@@ -208,7 +208,7 @@ class Search:
 
 def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator[Segment]:
     """Segments of a branch until a step fails, the limit is reached, or a tension field is slack and what follows is the mesh's."""
-    tracer = Tracer(Path(), StepControl().first, StepControl())
+    tracer = Tracer(Predictor(), StepControl().first, StepControl())
     points = trace_points(potential, point, tracer)
     for _ in range(max_steps):
         try:
@@ -223,7 +223,7 @@ def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator
 
 def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_steps: int) -> Iterator[Segment]:
     """As :func:`follow`, on a half of the branch that crosses at a branch point."""
-    tracer = Tracer(Path(), StepControl().first, StepControl())
+    tracer = Tracer(Predictor(), StepControl().first, StepControl())
     points, point = points_beyond(potential, crossing, direction, tracer), crossing.half(direction)
     for k in range(max_steps):
         try:

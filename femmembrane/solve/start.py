@@ -24,13 +24,13 @@ from ..potential import Potential, potential_of
 from .banded import negative_directions
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
 from .controls import CONTROLS, Control, ControlKind, Gas, PressureControl, VolumeControl
-from .finer import transferred
+from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
 from .newton import correct
 from .special_points import Segment
-from .state import Path, State, at_rest, flat_state, inner
+from .state import Predictor, State, at_rest, flat_state, inner
 from .stepping import march
 from .wellposed import ill_posed, is_slack, slackness, unresolved_source
 
@@ -394,7 +394,7 @@ def _first_met(
         return point.state
     away = abs(point.state.volume - potential.space.reference_volume) / potential.space.units["volume"]
     control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
-    tracer = Tracer(Path(), control.first * min(1.0, np.sqrt(away)), control)
+    tracer = Tracer(Predictor(), control.first * min(1.0, np.sqrt(away)), control)
     spare = None
     for _, new in zip(range(_STEPS), trace_points(potential, point, tracer), strict=False):
         for state in _met(Segment(potential, point, new), held, load, accept):

@@ -83,7 +83,7 @@ def distance(potential: Potential, x: Array, y: Array) -> float:
 
 
 @dataclass(slots=True)
-class Path:
+class Predictor:
     """The last two points of a path (x, P)(sigma) with their derivatives: predicts by cubic Hermite extrapolation."""
 
     sigma: list[float] = field(default_factory=list)

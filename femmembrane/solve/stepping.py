@@ -16,7 +16,7 @@ from ..potential import Array, Potential
 from .banded import BorderedFactor
 from .controls import Control
 from .newton import NewtonResult, correct
-from .state import Path, State, distance
+from .state import Predictor, State, distance
 from .wellposed import apparent, is_slack, slackness
 
 #: largest change that the corrector may make, relative to the step
@@ -36,7 +36,7 @@ def march(
     start: float,
     stop: float,
     *,
-    path: Path | None = None,
+    path: Predictor | None = None,
     corrector: Corrector = correct,
     parameter: str = "load",
     magnetic: float = 1.0,
@@ -51,7 +51,7 @@ def march(
         The control at a value of the parameter.
     start, stop : float
         Values of the parameter at ``state`` and at the end.
-    path : Path, optional
+    path : Predictor, optional
         Memory of the steps before, extended in place.
     corrector : callable
         :func:`.newton.correct` or a minimiser with its signature.
@@ -69,7 +69,7 @@ def march(
         With status STEP_UNDERFLOW when steps become tiny, SLACK when a tension field becomes slack before the end, DIPOLE_CONTACT;
         ``result`` holds the states accepted before.
     """
-    path = Path() if path is None else path
+    path = Predictor() if path is None else path
     factor_of = (lambda value: value) if parameter == "magnetic" else (lambda value: magnetic)
     if not path.sigma:
         path.append(start, state.x, state.pressure, *_slope(potential, state, control_at(start), parameter, start))

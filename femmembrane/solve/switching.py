@@ -31,7 +31,7 @@ from .banded import BorderedFactor, band_inner, band_product
 from .continuation import BranchPoint, Tracer, tangent_at, trace_points, unit_point
 from .controls import ArcLengthControl
 from .newton import TOLERANCE, correct
-from .state import Path, State, distance, inner
+from .state import Predictor, State, distance, inner
 
 #: a cubic coefficient this small beside the terms that cancel in it vanishes by symmetry
 SYMMETRIC = 1e-4
@@ -142,7 +142,7 @@ def points_beyond(potential: Potential, crossing: Crossing, direction: int, trac
     """
     start = crossing.half(direction)
     new = leave(potential, crossing, direction, tracer.step)
-    tracer.path = Path()
+    tracer.path = Predictor()
     for point in (start, new):
         tracer.path.append(point.sigma, point.state.x, point.state.pressure, point.tangent, point.tangent_pressure)
     yield new

@@ -4,13 +4,14 @@ The plain membrane is in compression along the meridian: the Legendre-Hadamard c
 compressive, but where the meridional one vanishes nothing holds the meridian against the pressure: it folds on a circle there.
 
 A stress that a mesh does not resolve has a sign of the mesh's: slopes of a layer or a needle swing about the true ones within an element.
-Compression is pronounced where it exceeds the variation of the stress from element to element, or survives in a finer space.
+Compression is pronounced where it exceeds the variation of the stress from element to element, or holds in finer spaces too. Finer
+spaces may contradict it. Where the state is not found in them, nothing is known of the membrane but what the one mesh shows.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,13 @@ from numpy.typing import NDArray
 from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
-from .finer import survives
+from .finer_space import confirmed
 from .state import State
 
 #: stress relative to the largest one that counts as none
 NO_STRESS = 1e-8
+#: what is said of a compression or a slack zone that finer spaces could contradict
+UNCONFIRMED = "on this mesh; not confirmed, since the state was not found on finer elements"
 
 #: tension in a finer space, relative to the largest stress, that contradicts a coarser one in which none is left
 _LITTLE = 0.05
@@ -30,11 +33,20 @@ _LITTLE = 0.05
 
 @dataclass(frozen=True)
 class IllPosed:
-    """Interval of reference radii in which a membrane is compressed, or slack in a tension field."""
+    """Interval of reference radii in which a membrane is compressed, or slack in a tension field.
+
+    Attributes
+    ----------
+    low, high : float
+    slack : bool
+    confirmed : bool
+        Whether it is more than this mesh alone says: False where the state was not found in finer spaces, which could contradict.
+    """
 
     low: float
     high: float
     slack: bool
+    confirmed: bool = True
 
     @property
     def status(self) -> Status:
@@ -45,9 +57,10 @@ class IllPosed:
         return interval(self.low, self.high)
 
     def __str__(self) -> str:
+        doubt = "" if self.confirmed else f" ({UNCONFIRMED})"
         if self.slack:
-            return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there"
-        return f"the meridional stress is compressive at {self.where}: the Legendre-Hadamard condition fails there"
+            return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there{doubt}"
+        return f"the meridional stress is compressive at {self.where}: the Legendre-Hadamard condition fails there{doubt}"
 
 
 def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
@@ -56,8 +69,9 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     if found is None:
         return None
     if found.slack:
-        return found if survives(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation) else None
-    return found if compressed(potential, evaluation, 0) is not None else None
+        sure = confirmed(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation)
+        return None if sure is False else replace(found, confirmed=bool(sure))
+    return compressed(potential, evaluation, 0)
 
 
 def _nearly_slack(evaluation: Evaluation) -> bool:
@@ -79,19 +93,21 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
 
 
-def compressed(potential: Potential, evaluation: Evaluation, component: int) -> tuple[float, float] | None:
-    """Smallest and largest reference radius at which a principal stress (0 meridional, 1 hoop) is compressive, on any mesh; None if none.
+def compressed(potential: Potential, evaluation: Evaluation, component: int) -> IllPosed | None:
+    """Where a principal stress (0 meridional, 1 hoop) is compressive, on any mesh; None where it is nowhere.
 
-    A compression that the mesh alone shows is left out, see :func:`.finer.survives`.
+    A compression that finer spaces contradict is left out, see :func:`.finer_space.confirmed`.
     """
     if not least_stress(evaluation, component):
         return None
     stress = evaluation.stress[component]
-    plain = _plain(stress.reshape(potential.space.R.shape))
-    if not plain and not survives(lambda found: least_stress(found.evaluation, component) < 0, potential, evaluation):
+    sure: bool | None = _plain(stress.reshape(potential.space.R.shape))
+    if not sure:
+        sure = confirmed(lambda found: least_stress(found.evaluation, component) < 0, potential, evaluation)
+    if sure is False:
         return None
     r = potential.space.R.ravel()[unsupported(stress, np.abs(evaluation.stress).max(), False)]
-    return float(r.min()), float(r.max())
+    return IllPosed(float(r.min()), float(r.max()), False, bool(sure))
 
 
 def least_stress(evaluation: Evaluation, component: int) -> float:
@@ -150,7 +166,8 @@ def slackness(potential: Potential, state: State, accepted: list[State] | None =
     """The error that ends a path at an ill-posed state, slack or compressed, with the states accepted before and it."""
     where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
     status = Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
-    return SolveError(f"at {where} {apparent(potential, state.evaluation)}", status=status, result=accepted)
+    found = ill_posed(potential, state.evaluation) or apparent(potential, state.evaluation)
+    return SolveError(f"at {where} {found}", status=status, result=accepted)
 
 
 def unsupported(stress: Array, scale: float, tension_field: bool) -> NDArray[np.bool_]:

@@ -21,8 +21,10 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from ..solve.wellposed import ill_posed
-from .azimuthal import azimuthal_operator, azimuthal_shape, lowest_eigenvalues, short_waves
+from .azimuthal import lowest_eigenvalues, short_waves
+from .azimuthal_operator import azimuthal_operator
 from .spectrum import SpectrumError
+from .wave_unknowns import azimuthal_shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +100,10 @@ def natural_frequencies(
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(x, pressure)
     bad = ill_posed(potential, evaluation)
-    where = (
-        short_waves(potential, operator, evaluation) if operator.n else str(bad or "")
-    )  # a hoop stress sets no axisymmetric wave in motion
-    if where:
+    # a hoop stress sets no axisymmetric wave in motion
+    wrinkles = [wrinkle.where for wrinkle in short_waves(potential, evaluation)] if operator.n else [str(bad)] if bad else []
+    if wrinkles:
+        where = "; ".join(wrinkles)
         raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=bad.status if bad else Status.LEGENDRE_FAILURE)
     try:
         found = lowest_eigenvalues(potential, x, pressure, n, count, control)

@@ -34,9 +34,9 @@ from ..errors import InputError, SolveError, Status
 from ..physics.loads import over_projection
 from ..potential import Array, Potential, potential_of
 from ..solve.controls import CenterHeightControl, PressureControl, VolumeControl
-from ..solve.finer import solved_in
+from ..solve.finer_space import solved_in
 from ..threads import one_thread
-from .azimuthal import LocalResponse, local_response
+from .second_variation import LocalResponse, local_response
 
 if TYPE_CHECKING:
     from ..results.records import Equilibrium

@@ -10,9 +10,11 @@ lower bound decide.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..kernels import kernels
@@ -75,7 +77,7 @@ def smallest_of(pencil: Pencil, guess: Array | None = None) -> SmallestEigenvalu
     start = pencil.inverse_iterations(pencil.lower_bound()) if guess is None else guess
     found = pencil.proved(start)
     if found is None:
-        found = pencil.lanczos()
+        found = pencil.lanczos()[0]
         if pencil.below(*found[:2]) > 0:
             raise SpectrumError("the eigenvalue found could not be proved to be the smallest")
     value, mode, error = found
@@ -84,6 +86,23 @@ def smallest_of(pencil: Pencil, guess: Array | None = None) -> SmallestEigenvalu
     if (negative > 0) != (value < 0) and abs(value) > 10 * error:
         raise SpectrumError(f"smallest eigenvalue {value:.6g} contradicts {negative} negative directions")
     return SmallestEigenvalue(value, mode, negative, error)
+
+
+def lowest_of(pencil: Pencil, count: int) -> list[tuple[float, Array, float]]:
+    """The lowest eigenvalues of a pencil, each counted with its multiplicity, with modes and errors; proved complete by inertia.
+
+    Raises
+    ------
+    SpectrumError
+        When those found cannot be proved to be the lowest.
+    """
+    for width in (max(2 * count + 1, 20), max(4 * count + 1, 60)):
+        found = pencil.lanczos(count, min(width, pencil.n))
+        # all that lies clearly below the last one must have been found
+        shift = found[-1][0] - max(1e-6 * abs(found[-1][0]), 1e-12 * pencil.scale)
+        if pencil.count(shift) == sum(value < shift for value, _, _ in found):
+            return found
+    raise SpectrumError(f"the {count} eigenvalues found could not be proved to be the lowest")
 
 
 class Pencil:
@@ -149,6 +168,18 @@ class Pencil:
             mode, right = self.normalised(self.solve(solver, right))
         return mode
 
+    def block_iterations(self, width: int = 6, iterations: int = 3) -> Array:
+        """Best vector of a block of inverse iterations: the lowest azimuthal eigenvalues are too close together for a single vector."""
+        solver = self.shifted_solver(self.lower_bound())
+        block = np.random.default_rng(0).standard_normal((self.n, min(width, self.n)))
+
+        def times(product: Callable[[Array], Array]) -> Array:
+            return np.stack([product(column) for column in block.T], axis=1)
+
+        for _ in range(iterations):
+            block = np.linalg.qr(self.solve(solver, times(self.times_mass)))[0]
+        return np.asarray(block @ eigh(block.T @ times(self.stiffness), block.T @ times(self.times_mass))[1][:, 0])
+
     def proved(self, guess: Array) -> tuple[float, Array, float] | None:
         """What :meth:`rayleigh` finds from a guess, if nothing lies below."""
         return kernels().rayleigh(self, guess, _TOLERANCES)
@@ -205,18 +236,31 @@ class Pencil:
         band = self.band - shift * self.mass if shift else self.band
         return negative_directions(band, self.kd, self.constraint, self.compliance)
 
-    def lanczos(self) -> tuple[float, Array, float]:
+    def lanczos(self, count: int = 1, width: int | None = None) -> list[tuple[float, Array, float]]:
+        """The eigenvalues that shift-invert Lanczos iterations find next to a certified lower bound, in order, with modes and errors.
+
+        ``width`` is the number of Lanczos vectors.
+        """
         shift = self.lower_bound()
         solver = self.shifted_solver(shift)
-        shape = (self.n, self.n)
-        mass = LinearOperator(shape, matvec=lambda x: self.times_mass(x.ravel()), dtype=float)
-        inverse = LinearOperator(shape, matvec=lambda x: self.solve(solver, x.ravel()), dtype=float)
-        stiffness = LinearOperator(shape, matvec=lambda x: self.stiffness(x.ravel()), dtype=float)
-        start = self.solve(solver, np.random.default_rng(0).standard_normal(self.n))
+
+        def operator(product: Callable[[Array], Array]) -> LinearOperator:
+            return LinearOperator((self.n, self.n), matvec=lambda x: product(x.ravel()), dtype=float)
+
+        def inverse(right: Array) -> Array:
+            return self.solve(solver, right)
+
+        start = inverse(np.random.default_rng(0).standard_normal(self.n))
+        mass = operator(self.times_mass)
         try:
-            _, modes = eigsh(stiffness, k=1, M=mass, sigma=shift, OPinv=inverse, v0=start, tol=1e-12)
+            values, modes = eigsh(
+                operator(self.stiffness), k=count, M=mass, sigma=shift, OPinv=operator(inverse), v0=start, ncv=width, tol=1e-12
+            )
         except (ArpackNoConvergence, ValueError, TypeError) as error:
             raise SpectrumError(f"Lanczos iterations did not converge: {error}") from error
-        mode, right = self.normalised(modes[:, 0])
-        value, size = self.quotient(mode, right)
-        return value, mode, size
+        found = []
+        for k in np.argsort(values):
+            mode, right = self.normalised(modes[:, k])
+            value, size = self.quotient(mode, right)
+            found.append((value, mode, size))
+        return found

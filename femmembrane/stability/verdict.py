@@ -17,8 +17,8 @@ from ..discretization.space import Space
 from ..errors import InputError
 from ..potential import Evaluation, Potential
 from ..solve.wellposed import apparent, ill_posed
-from .floating import pencil_of
-from .resolution import unresolved_axisymmetric
+from .mode_resolution import unresolved_axisymmetric
+from .rigid_motions import pencil_of
 from .spectrum import SmallestEigenvalue, smallest_of
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Verdict:
     ----------
     stable : bool or None
         None when the smallest eigenvalue is zero within its error, be it a marginal state or one whose sign the mesh does not resolve, or
-        (with NaN) could not be proved to be the smallest.
+        (with NaN) could not be proved to be the smallest, or when a compression that the mesh shows was not confirmed on finer elements.
     smallest_eigenvalue : float
         lambda of K phi = lambda M phi, a squared natural frequency in units of mu/(rho_m R0^2); NaN where no eigenvalue has a meaning.
     error : float
@@ -100,8 +100,7 @@ def axisymmetric_verdict(
     shown = apparent(potential, evaluation)
     bad = ill_posed(potential, evaluation) if shown else None
     if bad is not None:
-        reason = f"short-wave unstable: {bad}, and the spectrum has no lower bound under refinement"
-        return Verdict(False, np.nan, np.nan, control, 0, None, reason)
+        return short_wave_verdict(f"{bad}, and the spectrum has no lower bound under refinement", bad.confirmed, control, 0)
     if control == "gas" and compliance is None:
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
@@ -113,6 +112,13 @@ def axisymmetric_verdict(
     # compression that is the mesh's alone says that the mesh is not to be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
     return verdict_from(found, against(control, 0), control, 0, shape, unresolved)
+
+
+def short_wave_verdict(where: str, confirmed: bool, control: str | None, n: int) -> Verdict:
+    """The verdict where ever shorter waves have ever lower eigenvalues, or may have: a mesh alone that shows it leaves it open."""
+    wrinkling = " (wrinkling)" if n else ""
+    kind = f"short-wave unstable{wrinkling}" if confirmed else "not confirmed: short-wave unstable if the membrane is as this mesh shows it"
+    return Verdict(False if confirmed else None, np.nan, np.nan, control, n, None, f"{kind}: {where}")
 
 
 def against(control: str | None, n: int) -> str:

@@ -29,7 +29,7 @@ from ..checks import choice
 from ..discretization.space import Space, space_of_scene
 from ..potential import potential_of
 from ..scene import WRINKLING, Scene
-from ..solve.finer import survives
+from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
 from .profile import Profile, profile_at
 
@@ -218,7 +218,7 @@ class _Check:
             return bool((_deciding(finer, found.x, found.pressure, self.criterion)(s)[component] < 0).any())
 
         potential = potential_of(self.scene)
-        return survives(compressive, potential, potential.evaluate(self.x, self.pressure), self.pressure)
+        return confirmed(compressive, potential, potential.evaluate(self.x, self.pressure), self.pressure) is not False
 
 
 def _runs(flags: Sequence[bool]) -> list[tuple[int, int]]:

@@ -13,14 +13,14 @@ from ..potential import Array, potential_of
 from ..results.records import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CONTROLS, Control, control_kind
-from ..solve.finer import transferred
+from ..solve.finer_space import transferred
 from ..solve.newton import correct
 from ..solve.start import moderate
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_increasing, check_scene
 from .follow import equilibrium, run
-from .recording import record
+from .state_records import record
 from .trace import trace
 
 #: least number of elements of the reference, all of the highest degree

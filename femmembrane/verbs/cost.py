@@ -31,11 +31,11 @@ from ..scene import MAX_DEGREE, Analysis, Scene
 from ..solve.banded import BandFactor, BorderedFactor
 from ..solve.controls import CONTROLS, control_kind
 from ..solve.start import cold_start
-from ..stability.judge import judge
+from ..stability.checked_verdict import checked_verdict
 from ..stability.zones import find_zones
 from ..threads import one_thread
 from .arguments import check_scene
-from .recording import record
+from .state_records import record
 
 #: columns of the table, and the machine with every line so that a table can stand alone
 COLUMNS = (*(f.name for f in fields(Measurement)), "machine")
@@ -314,8 +314,8 @@ def _stages(course: Course) -> list[Job]:
     }
     for name, control, n in asked:
         # started from its own mode, as on a branch from that of the state before
-        guess = judge(potential, x, p, evaluation, control, n).coefficients
-        stages[name] = partial(judge, potential, x, p, evaluation, control, n, guess=guess)
+        guess = checked_verdict(potential, x, p, evaluation, control, n).coefficients
+        stages[name] = partial(checked_verdict, potential, x, p, evaluation, control, n, guess=guess)
     criterion = scene.analysis.wrinkling or "total"
     stages["zones of wrinkles"] = lambda: find_zones(scene, x, p, criterion)
     line = Measurement("stage", "", "", scene.degree, potential.space.n_elements, potential.space.n_free)

@@ -18,14 +18,14 @@ from ..potential import Evaluation, Family, Potential, potential_of
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
 from ..scene.variation import Parameter
-from ..solve import resolution, wellposed
+from ..solve import state_resolution, wellposed
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
 from ..solve.start import CONTACT
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
-from .recording import record
+from .state_records import record
 
 Array = NDArray[np.float64]
 
@@ -257,7 +257,7 @@ class _Following:
                 bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
                 new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
             scene = self.parameter.scene_at(new.number)
-            unresolved = ill_posed == "stop" and resolution.unresolved(self.system.family, self._state(new), scene)
+            unresolved = ill_posed == "stop" and state_resolution.unresolved(self.system.family, self._state(new), scene)
             if unresolved:
                 return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
             self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)

@@ -20,17 +20,17 @@ from ..scene import MAX_STEPS, Scene
 from ..solve.controls import CONTROLS, Gas, control_kind
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import TOLERANCE, correct
-from ..solve.resolution import refuse_unresolved
 from ..solve.search import Limit, beyond_crossing, beyond_limit, loss_before
 from ..solve.special_points import ON_FOLD
 from ..solve.start import cold_start, moderate, start_in_gas
-from ..solve.state import Path, State, at_rest, distance, flat_state, rests_flat
+from ..solve.state import Predictor, State, at_rest, distance, flat_state, rests_flat
+from ..solve.state_resolution import refuse_unresolved
 from ..solve.stepping import Corrector, march
 from ..solve.wellposed import slackness, unresolved_source
 from ..threads import one_thread
 from .arguments import check_height, check_scene
 from .meshing import on_chosen_mesh
-from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
+from .state_records import OnCheckpoint, OnStep, predictor_of, record, remembered, restore, resume, special_point
 from .trace import resume_trace, trace
 
 _SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
@@ -353,7 +353,7 @@ class _Walk:
     def __init__(self, potential: Potential, control: str, corrector: Corrector, start: Equilibrium | None) -> None:
         self.potential, self.control_at = potential, CONTROLS[control].at
         self.quantity, self.corrector = control, corrector if CONTROLS[control].minimised else correct
-        self.path = Path()
+        self.path = Predictor()
         self.state: State | None = None
         self.load = 0.0
         if start is not None:
@@ -372,7 +372,7 @@ class _Walk:
         self.load = rest + float(np.copysign(size, load - rest))
         try:
             self.state, _ = self._first(self.load, False)
-            self.path = Path()
+            self.path = Predictor()
         except SolveError:
             raise failure from None
 
@@ -381,7 +381,7 @@ class _Walk:
         memory = kept.memory
         if type(memory) is not PathMemory or not 0 < len(kept) <= len(loads):
             raise InputError("unfinished", kept, "a branch that on_checkpoint was called with is allowed")
-        self.state, self.path, self.load = restore(self.potential, kept[-1]), path_of(memory), float(loads[len(kept) - 1])
+        self.state, self.path, self.load = restore(self.potential, kept[-1]), predictor_of(memory), float(loads[len(kept) - 1])
 
     def to(self, load: float, jump: bool) -> tuple[State, _Turn | None]:
         """The state at a load, and where the branch turned back if it had to be left for it."""
@@ -389,14 +389,14 @@ class _Walk:
             # the flat unloaded membrane has no stiffness that a path could leave it by
             try:
                 self.state, turn = self._first(load, jump)
-                self.path = Path()
+                self.path = Predictor()
             except SolveError as failure:
                 self._begin_before(load, failure)
                 return self.to(load, jump)
         elif load != self.load and self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
             return self._through_flat(self.state, load, jump)
         elif load != self.load and at_rest(self.potential, self.quantity, load):
-            self.state, self.path, turn = flat_state(self.potential), Path(), None
+            self.state, self.path, turn = flat_state(self.potential), Predictor(), None
         else:
             return self._along(self.state, load, jump)
         return self._arrived(self.state, load, turn)
@@ -412,13 +412,13 @@ class _Walk:
                 raise
             turn = self._turn(error, load)
             if turn.limit.fold is None and turn.limit.landing is not None:
-                self.path = Path()
+                self.path = Predictor()
                 return self._arrived(turn.limit.landing, load, None)
             if turn.limit.fold is None and turn.limit.ill_posed is not None:
                 raise slackness(self.potential, turn.limit.ill_posed) from error
             if not jump or turn.limit.landing is None:
                 raise SolveError(str(turn), status=turn.status or error.status) from error
-            self.path = Path()
+            self.path = Predictor()
             return self._arrived(turn.limit.landing, load, turn)
         states[-1].iterations = sum(s.iterations for s in states)
         return self._arrived(states[-1], load, None)
@@ -440,7 +440,7 @@ class _Walk:
         if distance(self.potential, state.x, rest) > NEAR_REST * distance(self.potential, before.x, rest):
             state, later = self._along(state, load, jump)
             return state, later or turn
-        self.path = Path()
+        self.path = Predictor()
         if load == 0:
             self.state, self.load = flat_state(self.potential), load
             return self.state, turn

@@ -11,7 +11,7 @@ from ..errors import SolveError, Status
 from ..potential import potential_of
 from ..results.records import Branch, Equilibrium
 from ..scene import Scene
-from ..solve.finer import transferred
+from ..solve.finer_space import transferred
 from .arguments import check_scene
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from ..scene import Scene
 from ..solve.search import Search
 from ..threads import one_thread
 from .arguments import check_max_steps, check_scene
-from .recording import record
+from .state_records import record
 
 
 @dataclass(frozen=True, eq=False)

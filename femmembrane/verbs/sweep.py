@@ -20,12 +20,12 @@ from ..checks import whole
 from ..discretization.meridian import side
 from ..errors import InputError
 from ..memory import require
+from ..results.finished_scenes import FinishedScenes
 from ..results.grid import MEANING, dataset_of, load_dataset, save_dataset
-from ..results.kept import Kept
 from ..results.store import scene_text
 from ..scene import Scene
 from ..scene.keys import MAX_SCENES, set_key
-from . import pool
+from . import parallel
 from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def sweep(
     grid = _Grid.of(scene, over, quantity, Options(pressure, volume, direction))
     workers = _workers(workers, scheduler)
     with ExitStack() as stack:
-        kept = None if out is None else stack.enter_context(Kept(Path(out) / KEPT))
+        kept = None if out is None else stack.enter_context(FinishedScenes(Path(out) / KEPT))
         rows = _known(grid, kept)
         failed = sum(not row.values for row in rows.values())
         if on_scene is not None:
@@ -247,10 +247,10 @@ def plan_sweep(
     InputError
         As :func:`sweep`.
     """
-    processes = _workers(workers, None) or pool.cores()
+    processes = _workers(workers, None) or parallel.cores()
     grid = _Grid.of(scene, over, quantity, Options(pressure, volume, direction))
     with ExitStack() as stack:
-        kept = stack.enter_context(Kept(Path(out) / KEPT)) if out is not None and (Path(out) / KEPT).exists() else None
+        kept = stack.enter_context(FinishedScenes(Path(out) / KEPT)) if out is not None and (Path(out) / KEPT).exists() else None
         known = set(_known(grid, kept))
         left = [key for key in grid.distinct if key not in known]
         # in the middle of equal parts: corners are where a grid is at its strangest
@@ -289,7 +289,7 @@ class _Grid:
         first = {key: place for place, key in reversed(list(enumerate(keys)))}
         return cls(tables, values, quantity, options, tuple(keys), dict(sorted(first.items(), key=lambda item: item[1])))
 
-    def tasks(self, known: set[str]) -> Iterator[pool.Task]:
+    def tasks(self, known: set[str]) -> Iterator[parallel.Task]:
         """What is to be computed, each scene once."""
         for place, (key, scene) in enumerate(zip(self.keys, _scenes(self.tables, self.over), strict=True)):
             if key not in known and self.distinct[key] == place:
@@ -354,31 +354,31 @@ def _workers(workers: Any, scheduler: Any) -> int | None:
         return None
     if scheduler is not None:
         raise InputError("workers", workers, "not together with scheduler: a cluster has its own")
-    allowed = f"a whole number from 1 to {pool.MAX_WORKERS} is allowed; this process may use {pool.cores()} cores"
-    number = whole("workers", workers, allowed, most=pool.MAX_WORKERS)
-    require("workers", number - 1, pool.WORKER_BYTES, "more processes")
+    allowed = f"a whole number from 1 to {parallel.MAX_WORKERS} is allowed; this process may use {parallel.cores()} cores"
+    number = whole("workers", workers, allowed, most=parallel.MAX_WORKERS)
+    require("workers", number - 1, parallel.WORKER_BYTES, "more processes")
     return number
 
 
-def _computed(tasks: Iterator[pool.Task], workers: int | None, scheduler: str | None) -> Iterator[tuple[str, Row]]:
+def _computed(tasks: Iterator[parallel.Task], workers: int | None, scheduler: str | None) -> Iterator[tuple[str, Row]]:
     """The rows of tasks by whoever is to compute them; unless told, processes are started for what is left after ``_ALONE`` seconds."""
     if scheduler is not None:
-        yield from pool.on_cluster(tasks, scheduler)
-    elif workers is None and pool.cores() > 1:
+        yield from parallel.on_cluster(tasks, scheduler)
+    elif workers is None and parallel.cores() > 1:
         end = time.monotonic() + _ALONE
-        for row in pool.here(tasks):
+        for row in parallel.here(tasks):
             yield row
             if time.monotonic() > end:
                 break
         for task in tasks:  # one at least is left
-            yield from pool.on_cores(itertools.chain([task], tasks), pool.cores())
+            yield from parallel.on_cores(itertools.chain([task], tasks), parallel.cores())
     elif workers is not None and workers > 1:
-        yield from pool.on_cores(tasks, workers)
+        yield from parallel.on_cores(tasks, workers)
     else:
-        yield from pool.here(tasks)
+        yield from parallel.here(tasks)
 
 
-def _known(grid: _Grid, kept: Kept | None) -> dict[str, Row]:
+def _known(grid: _Grid, kept: FinishedScenes | None) -> dict[str, Row]:
     """The rows that are kept; what is no whole row is none, and computed again."""
     found = {} if kept is None else {key: _row(kept.get(key)) for key in grid.distinct}
     return {key: row for key, row in found.items() if row is not None}
@@ -390,7 +390,7 @@ def _row(kept: Mapping[str, Any] | None) -> Row | None:
     return _compact(Row(**kept))
 
 
-def _keep(kept: Kept | None, key: str, row: Row) -> None:
+def _keep(kept: FinishedScenes | None, key: str, row: Row) -> None:
     if kept is not None and row.status != UNEXPECTED:  # which may well go better another time
         kept.put(key, asdict(row))
 

@@ -12,17 +12,17 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
-from ..solve import resolution, wellposed
+from ..solve import state_resolution, wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_points, branches_crossing
 from ..solve.start import CONTACT, moderate, start_at_volume
-from ..solve.state import Path, at_rest
+from ..solve.state import Predictor, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..stability.azimuthal import azimuthal_eigenvalue
 from ..threads import one_thread
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
-from .recording import OnCheckpoint, OnStep, path_of, record, remembered, restore, resume, special_point
+from .state_records import OnCheckpoint, OnStep, predictor_of, record, remembered, restore, resume, special_point
 
 if TYPE_CHECKING:
     from ..accuracy.adapt import Shortfall
@@ -241,7 +241,7 @@ class _Tracing:
     ) -> _Tracing:
         clock = time.perf_counter()
         potential = potential_of(scene)
-        tracer = Tracer(Path(), steps.first, steps)
+        tracer = Tracer(Predictor(), steps.first, steps)
         special: list[SpecialPoint] | None = [] if special_points else None
         if isinstance(start, Branch):
             if direction != 1 or potential_of(start.scene) is not potential:
@@ -272,7 +272,7 @@ class _Tracing:
             state = start_at_volume(potential, volume)
         else:
             raise InputError("start", start, "a volume, an Equilibrium, a SpecialPoint or a traced Branch is allowed")
-        resolution.refuse_unresolved(potential, state)
+        state_resolution.refuse_unresolved(potential, state)
         tracing = cls(scene, potential, first_point(potential, state, direction), tracer, [], special, on_step, max_steps)
         return tracing._begun(clock)
 
@@ -314,7 +314,7 @@ class _Tracing:
             raise InputError(
                 "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
             )
-        tracer.path, tracer.step = path_of(memory), memory.step
+        tracer.path, tracer.step = predictor_of(memory), memory.step
         state = restore(potential, start[memory.regular - 1])
         point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1][:-1], float(memory.slopes[-1][-1]))
         # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
@@ -355,7 +355,7 @@ class _Tracing:
         segment = Segment(self.potential, self.point, new, leaving=self.crossing is not None and len(self.found) == 1)
         met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
-        if unresolved := resolution.unresolved(self.potential, (last or new).state):
+        if unresolved := state_resolution.unresolved(self.potential, (last or new).state):
             return Status.NOT_RESOLVED, f"at {self._place(last or new)} {unresolved}"
         closing = self._look_for_special_points(segment, last) if self.special is not None else None
         last = closing or last

@@ -30,7 +30,7 @@ import numpy as np
 from ..errors import InputError, unknown_name
 from ..results.files import remove_leftovers
 from ..results.store import replace_file
-from .stage import place_of
+from .surroundings import place_of
 from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from ..results.store import replace_file
 from ..stability.verdict import Verdict
 from ..threads import cached_property
 from .picture import aim, circles, new_plotter, polydata
-from .stage import Box
+from .surroundings import Box
 from .vtk import SECTORS, Array, Revolution, shown_length, smooth_profile, write_collection
 
 if TYPE_CHECKING:

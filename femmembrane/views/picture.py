@@ -19,7 +19,7 @@ from ..errors import InputError, unknown_name
 from ..results.store import MEANING, replace_file
 from ..stability.zones import KINDS
 from .backend import load
-from .stage import Box, surroundings
+from .surroundings import Box, surroundings
 from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, Status, unknown_name
 from ..results.store import replace_file
 from .backend import drawing, load, title_text
-from .stage import Box, clamped_ends, surroundings
+from .surroundings import Box, clamped_ends, surroundings
 from .vtk import smooth_profile
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, draw_meridian_zones, fill_zones, new_label, shown_kinds, zone_label, zone_order
 

@@ -21,8 +21,8 @@ from ..results.table import estimated
 from . import plots
 from .backend import load
 from .html import MOST_ROWS, branch_rows, pairs, table, text
-from .stage import Box
 from .style import STYLE
+from .surroundings import Box
 from .svg import dark, inline_svg, variable
 from .vtk import Array, smooth_profile
 from .zones import new_label

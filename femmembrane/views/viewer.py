@@ -16,7 +16,7 @@ from ..results.store import replace_file
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
 from .picture import Surface, aim, check_quantity, draw_key, draw_surface, draw_surroundings, new_plotter
-from .stage import Box, place_of
+from .surroundings import Box, place_of
 
 if TYPE_CHECKING:
     import pyvista

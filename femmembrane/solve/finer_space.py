@@ -120,12 +120,14 @@ def _counterpart(potential: Potential, state: bytes, pressure: float, factor: fl
     return None
 
 
-def survives(holds: Callable[[NewtonResult], bool], potential: Potential, evaluation: Evaluation, pressure: float | None = None) -> bool:
-    """Whether what a mesh shows of an equilibrium holds in finer spaces too; where the state is not found there nothing contradicts."""
+def confirmed(
+    holds: Callable[[NewtonResult], bool], potential: Potential, evaluation: Evaluation, pressure: float | None = None
+) -> bool | None:
+    """Whether what a mesh shows of an equilibrium holds in finer spaces too; None where the state was not found in one of them."""
     for level in LEVELS:
         found = counterpart(potential, evaluation, pressure, level=level)
         if found is None:
-            return True
+            return None
         if not holds(found):
             return False
     return True

@@ -14,9 +14,9 @@ from ..scene import Scene
 from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import RESIDUAL, correct, relative_residual
 from ..solve.special_points import Located
-from ..solve.state import Path, State
+from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
-from ..stability.judge import judge
+from ..stability.checked_verdict import checked_verdict
 from ..stability.verdict import Verdict
 
 OnStep = Callable[[int, int, Equilibrium], None]
@@ -56,15 +56,15 @@ def restore(potential: Potential, kept: Equilibrium) -> State:
     return State(kept.state, kept.pressure, evaluation, kept.iterations, 0.0, residual, 0.0)
 
 
-def remembered(path: Path, unknowns: int) -> PathMemory:
+def remembered(path: Predictor, unknowns: int) -> PathMemory:
     """A copy of a path, for the record."""
     shape = (len(path.sigma), unknowns + 1)
     return PathMemory(tuple(path.sigma), np.array(path.point).reshape(shape), np.array(path.slope).reshape(shape))
 
 
-def path_of(memory: PathMemory) -> Path:
+def predictor_of(memory: PathMemory) -> Predictor:
     """The path that was remembered."""
-    return Path(list(memory.sigma), list(memory.points), list(memory.slopes))
+    return Predictor(list(memory.sigma), list(memory.points), list(memory.slopes))
 
 
 def record(
@@ -83,7 +83,7 @@ def record(
     asked: list[tuple[str | None, int]] = [(control, 0) for control in scene.analysis.stability]
     for control, n in [*asked, *((None, n) for n in scene.analysis.azimuthal_modes)]:
         guess = previous.verdict(control, azimuthal=n).coefficients if previous is not None else None
-        verdicts[control, n] = judge(potential, state.x, state.pressure, state.evaluation, control, n, guess=guess)
+        verdicts[control, n] = checked_verdict(potential, state.x, state.pressure, state.evaluation, control, n, guess=guess)
     bad = ill_posed(potential, state.evaluation)
     coefficients = state.x.copy()
     coefficients.flags.writeable = False

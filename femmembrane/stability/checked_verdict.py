@@ -12,11 +12,12 @@ from ..checks import whole
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..scene import MAX_WAVES
-from ..solve.finer import counterpart, transferred
-from .azimuthal import azimuthal_verdict, mode_in
-from .resolution import small_eigenvalue
+from ..solve.finer_space import counterpart, transferred
+from .azimuthal import azimuthal_verdict
+from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError
 from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
+from .wave_unknowns import mode_in
 
 #: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once
 _CLEAR = 2.0
@@ -30,7 +31,7 @@ SAFETY = 3.0
 _ZERO = 0.1
 
 
-def judge(
+def checked_verdict(
     potential: Potential,
     x: Array,
     pressure: float,

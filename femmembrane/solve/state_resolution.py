@@ -20,7 +20,7 @@ from ..scene import MAX_DEGREE, Scene
 from .banded import negative_directions
 from .continuation import first_point
 from .controls import VolumeControl
-from .finer import counterpart, met_across, moved, solved_in, transferred
+from .finer_space import counterpart, met_across, moved, solved_in, transferred
 from .state import State
 from .stepping import march
 from .wellposed import apparent, ill_posed, poles_by_sources

@@ -24,7 +24,7 @@ _ALLOWED = "a folder that one sweep at a time may write to is needed"
 _BESIDE = ("", "-wal", "-journal", "-shm")
 
 
-class Kept:
+class FinishedScenes:
     """Values by key, as JSON texts; arrays become lists, and numbers come back to the last bit.
 
     Parameters

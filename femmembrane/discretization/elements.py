@@ -1,0 +1,55 @@
+"""Elements on an interval from scikit-fem, their nodes in the order of the meridian, and polynomials through points."""
+
+from __future__ import annotations
+
+import numpy as np
+import skfem
+from numpy.typing import NDArray
+from skfem.element import ElementLineP1, ElementLineP2, ElementLinePp
+
+from .meridian import Array
+
+
+def line_element(degree: int) -> skfem.Element:
+    """The element of a degree on [0, 1]."""
+    special = {1: ElementLineP1, 2: ElementLineP2}
+    return special[degree]() if degree in special else ElementLinePp(degree)
+
+
+def _local_order(degree: int) -> list[int]:
+    """scikit-fem numbers the two ends first; along the meridian the second end comes last."""
+    return [0, *range(2, degree + 1), 1]
+
+
+def meridian_order(line: skfem.MeshLine, element: skfem.Element) -> tuple[NDArray[np.int64], int]:
+    """Scalar node numbers of each element, increasing along the meridian, shape (degree + 1, n_elements), and their number."""
+    dofs = skfem.Dofs(line, element).element_dofs
+    flat = dofs[_local_order(dofs.shape[0] - 1)].T.ravel()
+    _, first = np.unique(flat, return_index=True)
+    rank = np.empty(first.size, dtype=np.int64)
+    rank[flat[np.sort(first)]] = np.arange(first.size)
+    return rank[flat].reshape(line.nelements, -1).T, first.size
+
+
+def shape_functions(degree: int, xi: Array) -> tuple[Array, Array]:
+    """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
+    element = line_element(degree)  # a new one: ElementLinePp remembers its values by the number of points alone
+    table = [element.lbasis(np.asarray(xi)[None, :], k) for k in _local_order(degree)]
+    value = np.stack([t[0] for t in table], axis=1)
+    slope = np.stack([t[1][0] for t in table], axis=1)
+    return value, slope
+
+
+def lobatto(degree: int) -> Array:
+    """Chebyshev-Lobatto points on [0, 1], ends included."""
+    return (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
+
+
+def lagrange(points: Array, at: Array) -> Array:
+    """Lagrange polynomials through points (m, n), each column at its own place (n,), shape (m, n)."""
+    result = np.ones_like(points)
+    for i in range(len(points)):
+        for j in range(len(points)):
+            if j != i:
+                result[i] *= (at - points[j]) / (points[i] - points[j])
+    return result

@@ -1,0 +1,262 @@
+"""A meridian cut into elements: what holds its ends, what closes its volume, and how its unknowns are numbered."""
+
+from __future__ import annotations
+
+import numpy as np
+import skfem
+from numpy.typing import ArrayLike, NDArray
+from skfem.quadrature import get_quadrature
+
+from ..errors import InputError
+from ..threads import cached_property
+from .elements import line_element, lobatto, meridian_order
+from .meridian import LEAST_LENGTH, Array, Meridian, extent, side
+from .supports import as_support, floats, free_rotations
+
+
+class Numbering:
+    """A meridian of elements of one degree: what holds it, where its quadrature points are, and how its unknowns are numbered.
+
+    A membrane that nothing holds along the axis is held there at one node, ``pin``: a rigid motion costs no energy, and would leave the
+    equations without a single solution. The forces of that support are zero at an equilibrium.
+
+    Parameters
+    ----------
+    mesh : Meridian
+    degree : int
+    quadrature : int, optional
+        Polynomial degree integrated exactly; default 2 degree + 1.
+    anchored : frozenset of {"along", "shift", "tilt"}
+        Rigid motions that something outside, such as a magnetic source, sees: along the axis, across it, and about a diameter. They are
+        not free, and nothing is pinned for them.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether the last node is the first one.
+    size : float
+        Largest radius of the meridian, or its height if that is larger.
+    side : {1, -1}
+        Whether the inside of the membrane is on the right of the meridian or on its left (:func:`.meridian.side`).
+    lids : bool
+        Whether flat lids across the ends close the volume; else every end is a pole or in the plane Z = 0, which closes it.
+    wall : (ndarray, ndarray) or None
+        Where an end slides along a wall: a function of the meridian, and its slope along the reference element, that is the squared
+        radius of the wall at such an end and zero at others. The volume then has the further term pi [wall w] of the ends.
+    on_axis : ndarray of bool, shape (2,)
+        Whether each end is on the axis.
+    spreads : bool
+        Whether an end off the axis can move in its plane.
+    free_ends : list of {0, -1}
+        The ends that nothing holds, the first or the last.
+    axis_nodes : list of int
+        Nodes, counted along the meridian, that are on the axis or the rim of a rigid disc across it.
+    hubs : list of {0, -1}
+        The ends that are rims of rigid discs, the first or the last.
+    edges : list of {0, -1}
+        The ends off the axis.
+    nodes : ndarray of int, shape (degree n_elements + 1,)
+        Number of each node in the order of the unknowns, along the meridian.
+    loose : bool
+        Whether something outside alone holds the membrane along the axis.
+    pin : int or None
+        Node held along the axis, counted along the meridian: ``widest`` or none.
+    widest : int
+        Of the ends of elements that of the largest radius, and of these the nearest to the middle.
+    rotations : (bool, bool)
+        Whether a shift across the axis, and a tilt, are rigid motions.
+    points : ndarray, shape (n_quadrature,)
+        Quadrature points of the reference element.
+    n_elements, n_quadrature, n_free, half_bandwidth : int
+    R, R_x, Z, Z_x : ndarray, shape (n_quadrature, n_elements)
+        Reference meridian at the quadrature points; _x is the derivative along the reference element [0, 1].
+    radial : bool
+        Whether the parameter of the meridian is its radius.
+    lengths : ndarray, shape (n_elements,)
+        Arc length of each element at rest.
+    unit : float
+        Length by which everything of this membrane is measured, so that no answer hangs on the unit of its lengths: its largest radius,
+        or its arc length where that is smaller, of a closed curve its arc length over 2 pi. It is 1 for a disc, a sphere, and a torus.
+    slenderness : float
+        Size of the meridian over ``unit``, at least 1: what digits positions lose beside displacements.
+    weights : ndarray, shape (n_quadrature, n_elements)
+        2 pi times the quadrature weight on the reference element.
+    """
+
+    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
+        self.mesh, self.degree, self.anchored, self.side = mesh, degree, anchored, side(mesh)
+        self.ends: Array = mesh.breakpoints()
+        self.sizes: Array = np.diff(self.ends)
+        line = skfem.MeshLine(self.ends)
+        element = line_element(degree)
+        local, n_nodes = meridian_order(line, element)
+        points, weights = get_quadrature(element, 2 * degree + 1 if quadrature is None else quadrature)
+        self.n_elements, self.n_quadrature = line.nelements, points.shape[1]
+        mapping = line.mapping()
+        self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
+        self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
+        self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.radial = bool((self.s == self.R).all())
+        self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
+        self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
+
+        span = float(self.lengths.sum()) / (1 if mesh.supports() else 2 * np.pi)
+        self._support(n_nodes)
+        self.unit = min(float(mesh.position(self.ends)[0].max()), span)
+        self.slenderness = max(1.0, extent(*mesh.position(self.ends)) / self.unit)
+        self._number(self.nodes[local])
+        self.points: Array = points[0]
+
+    def _support(self, n_nodes: int) -> None:
+        """What holds the ends, what closes the volume there, and what is done about rigid motions."""
+        self.supports = tuple(as_support(held) for held in self.mesh.supports())
+        self.closed = not self.supports
+        R, Z = self.mesh.position(self.ends[[0, -1]])
+        size = self.size = extent(*self.mesh.position(self.ends))
+        self.on_axis = on_axis = np.abs(R) <= LEAST_LENGTH * size
+        self.axis_nodes = [] if self.closed else [k * (n_nodes - 1) for k in (0, 1) if on_axis[k] or self.supports[k].rigid]
+        self.hubs = [-k for k, support in enumerate(self.supports) if support.rigid]
+        self.edges = [-k for k, _ in enumerate(self.supports) if not on_axis[k]]
+        self.nodes: NDArray[np.int64] = _folded(n_nodes) if self.closed else np.arange(n_nodes)
+        self.n_nodes = n_nodes - int(self.closed)
+        adrift = floats(self.supports)
+        level = np.abs(Z) <= LEAST_LENGTH * size
+        in_plane = [pole or ("w" in end.held and at_zero) for pole, end, at_zero in zip(on_axis, self.supports, level, strict=False)]
+        self.loose = adrift and "along" in self.anchored
+        self.lids = adrift or not all(in_plane)
+        shift, tilt = free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
+        self.rotations = (shift and "shift" not in self.anchored, tilt and "tilt" not in self.anchored)
+        radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
+        if not radius.max() > 0:
+            raise InputError("mesh.elements", self.n_elements, "a meridian from pole to pole needs 2 or more elements")
+        middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
+        self.widest = self.degree * int(np.lexsort((middle, -np.round(radius / radius.max(), 9)))[0])
+        self.pin = self.widest if adrift and not self.loose else None
+        off_axis = [end for end, pole in zip(self.supports, on_axis, strict=False) if not pole]
+        self.spreads = any("u" not in end.held for end in off_axis)
+        walls = [R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)]
+        self.wall = self.between(walls) if any(walls) else None
+        self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
+
+    @property
+    def units(self) -> dict[str, float]:
+        """What pressures, volumes and heights of this membrane are measured by, in those of R0."""
+        return {"pressure": 1 / self.unit, "volume": self.unit**3, "center_height": self.unit}
+
+    def between(self, at_ends: list[float]) -> tuple[Array, Array]:
+        """A linear function of the meridian and its slope along the reference element, from values at its ends."""
+        slope = (at_ends[1] - at_ends[0]) / (self.ends[-1] - self.ends[0])
+        return at_ends[0] + slope * (self.s - self.ends[0]), np.broadcast_to(slope * self.sizes, self.s.shape)
+
+    def _number(self, local: NDArray[np.int64]) -> None:
+        free = np.ones((self.n_nodes, 2), dtype=bool)
+        for node, support in zip(self.nodes[[0, -1]], self.supports, strict=False):
+            free[node] &= ["u" not in support.held, "w" not in support.held]
+        if self.pin is not None:
+            free[self.nodes[self.pin], 1] = False
+        self.n_free = int(free.sum())
+        # one spare slot past the end stands for all that is held at zero
+        numbers: NDArray[np.int64] = np.full((self.n_nodes, 2), self.n_free, dtype=np.int64)
+        numbers[free] = np.arange(self.n_free)
+        self.numbers = numbers
+        self.gather = np.concatenate([numbers[local, 0], numbers[local, 1]])
+        self.half_bandwidth = band_of(self.gather, self.n_free) if self.closed else min(2 * self.degree + 1, max(self.n_free - 1, 0))
+        self.fields = tuple(_as_slice(np.sort(column[column < self.n_free])) for column in numbers.T)
+        self.pole = int(numbers[self.nodes[0], 1])
+        self.first_height = float(self.mesh.position(self.ends[:1])[1][0])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """In words, what is done about motions of the membrane as a whole that the supports leave."""
+        R, Z = (round(float(c[0]), 9) + 0.0 for c in self.mesh.position(self.ends[[self.widest // self.degree]]))
+        where = f"the circle r = {R:.4g}, z = {Z:.4g}"
+        notes = []
+        if self.loose:
+            notes.append("nothing but the sources holds the membrane along the axis")
+        if self.pin is not None:
+            notes.append(f"nothing holds the membrane along the axis: {where} is kept at its height, without any force")
+        if any(self.rotations):
+            moves = " and ".join(name for name, free in zip(("shifts", "tilts"), self.rotations, strict=True) if free)
+            notes.append(f"{moves} across the axis cost no energy: they are left out of verdicts on n = 1")
+        return tuple(notes)
+
+    @cached_property
+    def _end_positions(self) -> Array:
+        return np.stack(self.mesh.position(self.ends))
+
+    @cached_property
+    def _axis(self) -> list[tuple[int, float]]:
+        """Unknown and height at rest of each of :attr:`axis_nodes`."""
+        heights = self.mesh.position(self.node_parameters()[self.axis_nodes])[1]
+        return list(zip(self.numbers[self.nodes[self.axis_nodes], 1].tolist(), heights.tolist(), strict=True))
+
+    @cached_property
+    def area_weights(self) -> Array:
+        """Weights of the integral over the reference area, with the 2 pi, shape (n_quadrature, n_elements)."""
+        area: Array = self.weights * self.R * np.hypot(self.R_x, self.Z_x)
+        return area
+
+    @cached_property
+    def reference_area(self) -> float:
+        """Area of the membrane at rest, over R0^2."""
+        return float(self.area_weights.sum())
+
+    @cached_property
+    def reference_volume(self) -> float:
+        """Volume that the membrane encloses at rest, over R0^3."""
+        density = -(self.R**2) * self.Z_x / 2 if self.lids else self.R * self.R_x * self.Z
+        return self.side * float((self.weights * density).sum()) + 0.0
+
+    @cached_property
+    def center(self) -> float:
+        """Height of the middle between the first and the last end."""
+        return float(self._end_positions[1, [0, -1]].mean())
+
+    @cached_property
+    def spins(self) -> bool:
+        """Whether the reference surface is a whole sphere: turned about any diameter it is the same."""
+        if self.closed or not self.on_axis.all():
+            return False
+        height = self.Z - self.center
+        radius = np.hypot(self.R, height)
+        off = np.abs(radius / radius.max() - 1).max()
+        across = np.abs(self.R * self.R_x + height * self.Z_x) / (radius * np.hypot(self.R_x, self.Z_x))
+        return bool(max(off, across.max()) < 1e-9)
+
+    def interpolation_points(self) -> Array:
+        """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""
+        points = self.ends[:-1] + lobatto(self.degree)[:, None] * self.sizes
+        points[0], points[-1] = self.ends[:-1], self.ends[1:]  # neighbours share their end, and the last one is that of the meridian
+        return points
+
+    def node_parameters(self) -> Array:
+        """Parameters s of the nodes along the meridian: element ends and degree - 1 points between, shape (degree n_elements + 1,)."""
+        points = self.interpolation_points()
+        return np.append(points[:-1].T.ravel(), points[-1, -1])
+
+    def locate(self, s: ArrayLike) -> tuple[NDArray[np.int64], Array]:
+        """Element and reference coordinate of parameters s."""
+        s = np.asarray(s, dtype=float)
+        element = np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, self.n_elements - 1)
+        return element, (s - self.ends[element]) / self.sizes[element]
+
+
+def band_of(gather: NDArray[np.int64], n_free: int) -> int:
+    """Half bandwidth that the unknowns of the elements, one column each, leave; those numbered ``n_free`` are none."""
+    inside = gather < n_free
+    low, high = np.where(inside, gather, n_free).min(axis=0), np.where(inside, gather, -1).max(axis=0)
+    return int((high - low).max(initial=0))
+
+
+def _folded(n_nodes: int) -> NDArray[np.int64]:
+    """Numbers of the nodes of a closed curve, the last one the first again, so that neighbours differ by two at most."""
+    k = np.arange(n_nodes)
+    n = n_nodes - 1
+    return np.where(2 * k <= n, np.maximum(2 * k - 1, 0), 2 * (n - k))
+
+
+def _as_slice(index: NDArray[np.int64]) -> slice | NDArray[np.int64]:
+    """The same selection as a slice where the numbers are evenly spaced: a view instead of a copy."""
+    if index.size > 2 and (np.diff(index) == index[1] - index[0]).all():
+        return slice(int(index[0]), int(index[-1]) + 1, int(index[1] - index[0]))
+    return index

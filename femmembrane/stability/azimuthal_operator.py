@@ -1,0 +1,162 @@
+"""The operator of perturbations with n waves around the axis: K and M as band matrices, and the motions that cost nothing.
+
+Rigid motions that the supports leave are taken out, and of a sphere the motion of its material in itself under the deformed shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import whole
+from ..discretization.space import Space
+from ..potential import Array, Potential
+from .mode_resolution import small_eigenvalue
+from .rigid_motions import pencil_of, rigid_part
+from .second_variation import LocalResponse, response_at_quadrature, second_variation
+from .spectrum import Pencil
+from .wave_unknowns import RADIAL, VERTICAL, WaveUnknowns, azimuthal_shape, wave_unknowns
+
+#: departure from a rigid motion, relative to its size, below which the turned material of a sphere has only turned as a whole
+_ROUND = 1e-6
+#: iterations that lead from there to the eigenvector of the mesh, and the least part of its square that this must have in common with it
+_INVERSE_ITERATIONS, _ALIKE = 3, 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class AzimuthalOperator:
+    """K and M of the perturbations with n waves around the axis.
+
+    Attributes
+    ----------
+    band, mass : ndarray, shape (3 kd + 1, n_free)
+        In LAPACK general band storage.
+    half_bandwidth : int
+        kd = 3 degree + 2 (2 degree + 1 for n = 0).
+    numbering : ndarray of int, shape (n_nodes, 3)
+        Unknown of (a, c, b) at each node along the meridian; n_free stands for what is held. On the axis at n = 1, c = -a share one.
+    n : int
+    response : LocalResponse
+        At the quadrature points, shape (n_quadrature, n_elements).
+    density : ndarray, shape (18, n_quadrature, n_elements)
+        What ``band`` integrates: second derivatives of the quadratic form at the points, times the weights, in the order of
+        :data:`.second_variation.PAIRS`.
+    rigid : ndarray, shape (n_free, k), or None
+        Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
+    spin : ndarray, shape (n_free,), or None
+        The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
+    """
+
+    band: Array
+    mass: Array
+    half_bandwidth: int
+    numbering: NDArray[np.int64]
+    n: int
+    response: LocalResponse
+    space: Space
+    density: Array
+    rigid: Array | None = None
+    spin: Array | None = None
+
+    def pencil(self, constraint: Array | None = None) -> Pencil:
+        """K - lambda M, motions that cost nothing taken out."""
+        return pencil_of(self.band, self.mass, self.half_bandwidth, self.spin if constraint is None else constraint, 0.0, self.rigid)
+
+    def shape(self, mode: Array) -> dict[str, Array]:
+        """A mode at the nodes, see :func:`azimuthal_shape`."""
+        return azimuthal_shape(self.space, self.n, mode)
+
+
+def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) -> AzimuthalOperator:
+    """Second variation against n waves around the axis at an equilibrium (x, P).
+
+    Parameters
+    ----------
+    potential : Potential
+    x : ndarray, shape (n_free,)
+        Displacement coefficients of the axisymmetric state.
+    pressure : float
+    n : int
+        0 gives the axisymmetric operator under pressure control.
+
+    Raises
+    ------
+    InputError
+        For n that is no whole number >= 0.
+    """
+    check_waves(n, 0)
+    space = potential.space
+    layout = wave_unknowns(space, min(n, 2))
+    response = response_at_quadrature(potential, np.asarray(x, dtype=float).tobytes())
+    density = np.stack(second_variation(space, response, potential.loads, pressure, n))
+    band = layout.assemble(density)
+    for end in space.free_ends if n else ():
+        rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
+        i, j = layout.numbers[space.nodes[end], [RADIAL, VERTICAL]]
+        work = np.pi * n * pressure * float(rho[0]) * (space.side if end == 0 else -space.side)  # of the film across a free edge
+        for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
+            band[2 * layout.half_bandwidth + row - column, column] += work
+    rigid, spin = None, None
+    motions = _rigid_motions(space, response, int(n))
+    if len(motions):
+        area = space.area_weights
+        rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
+    if n == 1 and space.spins:
+        spin = _spin(space, layout, response, motions, pencil_of(band, layout.mass, layout.half_bandwidth, None, 0.0, rigid))
+    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
+
+
+def _products(first: Array, second: Array, area: Array) -> Array:
+    """Inner products of fields (a, c, b) over the reference area."""
+    return np.einsum("ifqe,jfqe,qe->ij", first, second, area)
+
+
+def _rigid_motions(space: Space, r: LocalResponse, n: int) -> Array:
+    """Motions as a whole, shape (k, 3, n_quadrature, n_elements): along the axis at n = 0; a shift and a tilt, if free, at n = 1."""
+    if n > 1 or (n == 1 and not any(space.rotations)) or (n == 0 and space.pin is None):
+        return np.zeros((0, 3, *r.rho.shape))
+    one, zero = np.ones_like(r.rho), np.zeros_like(r.rho)
+    shift, tilt = (one, -one, zero), (r.eta, -r.eta, -r.rho)
+    if n == 0:
+        motions = [(zero, zero, one)]
+    else:
+        free = space.rotations
+        motions = [motion for motion, is_free in zip((shift, tilt), free, strict=True) if is_free]
+        if free == (False, True):  # about the circle that is held in its plane
+            place = next(k for k, support in enumerate(space.supports) if "u" in support.held and not space.on_axis[k])
+            height = (r.eta[0, 0], r.eta[-1, -1])[place]
+            motions = [(r.eta - height, height - r.eta, -r.rho)]
+    return np.array(motions)
+
+
+def _spin(space: Space, layout: WaveUnknowns, r: LocalResponse, rigid: Array, pencil: Pencil) -> Array | None:
+    """The mass times the motion of a sphere's material in itself under its deformed shape; None where it is a rigid one.
+
+    Turned about an axis through its equator, a uniform sphere is the same sphere: whatever is integrated over its reference area, energies
+    of sources and loads included, stays as it is when the material moves along so. With v = (v_S, v_theta) the velocities of that rotation
+    along the reference sphere the motion is x_S v_S + x_theta v_theta/R. Of a round shape it is a tilt of the whole.
+    """
+    J = np.hypot(space.R_x, space.Z_x)
+    height = space.Z - space.center
+    along = (height * space.R_x - space.R * space.Z_x) / J**2
+    field = np.stack([along * r.rho_x, -r.rho / space.R * height, along * r.eta_x])[None]
+    area = space.area_weights
+    size = float(_products(field, field, area)[0, 0])
+    if len(rigid):
+        shares = np.linalg.solve(_products(rigid, rigid, area), _products(rigid, field, area))
+        field = field - np.einsum("ij,ifqe->jfqe", shares, rigid)
+        if _products(field, field, area)[0, 0] <= _ROUND**2 * size:
+            return None
+    product = layout.integrate(field[0] * area)
+    # slopes of the shape jump where elements meet: of the motion the mesh holds that eigenvector which is next to it, and next to zero
+    solver, kept = pencil.shifted_solver(0.0), product
+    for _ in range(_INVERSE_ITERATIONS):
+        mode, kept = pencil.normalised(pencil.solve(solver, kept))
+    alike = float(mode @ product) ** 2 >= _ALIKE * float(_products(field, field, area)[0, 0])
+    return kept if alike and abs(mode @ pencil.stiffness(mode)) <= small_eigenvalue(space) else None
+
+
+def check_waves(n: int, least: int) -> None:
+    whole("azimuthal", n, least=least)

@@ -1,0 +1,234 @@
+"""Second variation against perturbations with n waves around the axis: wobbling, tipping sideways, wrinkling.
+
+::
+
+    u = (a cos n theta, c sin n theta, b cos n theta)        in (e_rho, e_theta, e_z),   a, c, b functions of the meridian
+
+Each n decouples from all others, so three functions on the meridian and one banded matrix describe a perturbation of the whole surface.
+With t the unit tangent of the deformed meridian, nu its normal, ' = d/dS along the reference meridian, and
+e = -(n a + c)/R, f = -n b/R, q = (a + n c)/R, the displacement gradient has the components (t, theta, nu)::
+
+    g1 = (t.(a', b'), c', nu.(a', b')),        g2 = (t.(e, f), q, nu.(e, f))
+
+and the quadratic form is, per reference area,
+
+    W_11 g1t^2 + 2 W_12 g1t g2th + W_22 g2th^2 + A (g1th^2 + g2t^2) + 2 B g1th g2t + W_1/l1 g1nu^2 + W_2/l2 g2nu^2
+    + m_rr a^2 + 2 m_rz a b + m_zz b^2 + m_r/rho c^2                                  (m: energy density of sources, loads)
+
+with A = (l1 W_1 - l2 W_2)/(l1^2 - l2^2), B = (l2 W_1 - l1 W_2)/(l1^2 - l2^2), minus P times the second variation of the enclosed volume,
+2 Int eta (a a_x + c c_x + n (a c)_x) + rho_x (a b + n b c) + rho a_x b dx. Where an end moves in its plane, the lid that closes the volume
+there counts too: by parts -Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c b_x + n b c_x) - n rho_x b c dx, and at a free edge, whose
+lid is a film that its edge makes harmonic, b (r/rho)^n cos n theta to first order, further [n rho a b] of the two ends. A load g(eta) over
+the projected area adds the first form with g for eta in its first term and g' before the others, and g'' rho rho_x b^2.
+
+Integrals over theta are normalised as for n = 0, 2 pi instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues
+do not depend on it. c plays no part at n = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..discretization.space import Space
+from ..physics.kinematics import hencky_strains
+from ..physics.loads import Load, over_projection
+from ..physics.tension_field import natural_strains
+from ..potential import Array, Potential
+
+#: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
+#: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)
+EQUAL_STRETCH = 1e-3
+
+#: local variables (a, a_x, c, c_x, b, b_x); pairs (c_x, b_x), (a_x, c_x) and (b, b_x) never meet
+_A, _AX, _C, _CX, _B, _BX = range(6)
+VALUES = (_A, _C, _B)
+PAIRS = (
+    (_A, _A),
+    (_A, _AX),
+    (_A, _C),
+    (_A, _CX),
+    (_A, _B),
+    (_A, _BX),
+    (_AX, _AX),
+    (_AX, _C),
+    (_AX, _B),
+    (_AX, _BX),
+    (_C, _C),
+    (_C, _CX),
+    (_C, _B),
+    (_C, _BX),
+    (_CX, _CX),
+    (_CX, _B),
+    (_B, _B),
+    (_BX, _BX),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LocalResponse:
+    """Stretches, stresses, tangent moduli and magnetic derivatives at points of a deformed meridian.
+
+    Attributes
+    ----------
+    rho, eta, rho_x, eta_x : deformed position and slopes
+    t_rho, t_z : unit tangent
+    s1, s2 : principal mechanical stresses l_i W_i
+    W11, W12, W22 : second derivatives of the strain energy with respect to the stretches
+    N1, N2 : W_1/l1 and W_2/l2, the stiffness of rotation out of the surface
+    A, B : in-plane shear moduli, continuous through l1 = l2
+    field : ndarray, shape (6, ...)
+        m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta of the energy density of sources and loads.
+    """
+
+    rho: Array
+    eta: Array
+    rho_x: Array
+    eta_x: Array
+    t_rho: Array
+    t_z: Array
+    s1: Array
+    s2: Array
+    W11: Array
+    W12: Array
+    W22: Array
+    N1: Array
+    N2: Array
+    A: Array
+    B: Array
+    field: Array
+
+
+def local_response(potential: Potential, meridian: tuple[Array, ...], displacement: tuple[Array, ...]) -> LocalResponse:
+    """Response at points (R, R_x, Z, Z_x) of the reference meridian displaced by (u, u_x, w, w_x); R > 0 and any shape."""
+    R, R_x, Z, Z_x = meridian
+    u, u_x, w, w_x = displacement
+    shape = R.shape
+    rho, eta, rho_x, eta_x = R + u, Z + w, R_x + u_x, Z_x + w_x
+    e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
+    s1, s2, d11, d12, d22 = potential.response(e1, e2).reshape(5, *shape)
+    l1, l2 = np.exp(e1), np.exp(e2)
+    slope = np.hypot(rho_x, eta_x)
+    # l1^2 - l2^2 = 2 l1 l2 sinh d for d = e1 - e2
+    d = e1 - e2
+    A = _stress_quotient(potential, e1, e2, s1 - s2, d) * _over_sinh(d) / (2 * l1 * l2)
+    B = ((l1**2 + l2**2) / 2 * A - (s1 + s2) / 2) / (l1 * l2)
+    return LocalResponse(
+        rho=rho,
+        eta=eta,
+        rho_x=rho_x,
+        eta_x=eta_x,
+        t_rho=rho_x / slope,
+        t_z=eta_x / slope,
+        s1=s1,
+        s2=s2,
+        W11=(d11 - s1) / l1**2,
+        W12=d12 / (l1 * l2),
+        W22=(d22 - s2) / l2**2,
+        N1=s1 / l1**2,
+        N2=s2 / l2**2,
+        A=A,
+        B=B,
+        field=potential.field_energy(rho, eta).reshape(6, *shape),
+    )
+
+
+def _over_sinh(d: Array) -> Array:
+    """d/sinh d."""
+    safe = np.where(d == 0, 1.0, d)
+    return np.where(d == 0, 1.0, safe / np.sinh(safe))
+
+
+def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Array, d: Array) -> Array:
+    """(s_1 - s_2)/(e_1 - e_2), continuous through equal stretches.
+
+    For an isotropic material the difference g is odd in d at fixed mean strain, so g/d = Int_0^1 g'(t d) dt has an even integrand, and
+    one evaluation at t = 1/sqrt 3 is a Gauss rule of two points.
+    """
+    close = np.abs(d) < EQUAL_STRETCH
+    if potential.scene.tension_field:  # where one stress is gone, the difference is odd but not smooth, and has no digits to lose
+        _, _, taut1, taut2 = natural_strains(e1, e2)
+        close &= taut1 == taut2
+    quotient: Array = difference / np.where(close, 1.0, d)
+    if close.any():
+        mean, half = (e1 + e2)[close] / 2, d[close] / np.sqrt(12)
+        _, _, d11, d12, d22 = potential.response(mean + half, mean - half)
+        quotient[close] = (d11 - 2 * d12 + d22) / 2
+    return quotient
+
+
+@lru_cache(maxsize=4)
+def response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse:
+    """Remembered for the other n of the same state."""
+    space = potential.space
+    displacement = space.at_quadrature(np.frombuffer(state)).reshape(4, space.n_quadrature, -1)
+    return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement))
+
+
+def second_variation(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: float, n: int) -> list[Array]:
+    """Second derivatives of the quadratic form at the points, times the weights, in the order of PAIRS."""
+    J = np.hypot(space.R_x, space.Z_x)
+    area = space.weights * space.R * J
+    xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
+    inside = space.weights * space.side
+    g, g_z, g_zz = (part * inside for part in over_projection(loads, r.eta))
+    t, z = r.t_rho, r.t_z
+    A, B, N1, N2 = r.A, r.B, r.N1, r.N2
+    along, out, across = A * t**2 + N2 * z**2, A * z**2 + N2 * t**2, (A - N2) * t * z  # of e, of f, mixed
+    _, m_r, _, m_rr, m_rz, m_zz = r.field
+    entries = {
+        (_A, _A): (r.W22 + n**2 * along) * oo + m_rr * area,
+        (_A, _AX): r.W12 * t * xo,
+        (_A, _C): n * (r.W22 + along) * oo,
+        (_A, _CX): -n * B * t * xo,
+        (_A, _B): n**2 * across * oo + m_rz * area,
+        (_A, _BX): r.W12 * z * xo,
+        (_AX, _AX): (r.W11 * t**2 + N1 * z**2) * xx,
+        (_AX, _C): n * r.W12 * t * xo,
+        (_AX, _BX): (r.W11 - N1) * t * z * xx,
+        (_C, _C): (n**2 * r.W22 + along) * oo + m_r / r.rho * area,
+        (_C, _CX): -B * t * xo,
+        (_C, _B): n * across * oo,
+        (_C, _BX): n * r.W12 * z * xo,
+        (_CX, _CX): A * xx,
+        (_CX, _B): -n * B * z * xo,
+        (_B, _B): n**2 * out * oo + m_zz * area + g_zz * r.rho * r.rho_x,
+        (_BX, _BX): (r.W11 * z**2 + N1 * t**2) * xx,
+    }
+    parts = [_volume_density(space, r, -pressure * inside, n)]
+    if loads:
+        parts.append(_projected_density(r, g, g_z, n))
+    for pair, part in (item for added in parts for item in added.items()):
+        entries[pair] = entries[pair] + part if pair in entries else part
+    return [entries.get(pair, np.zeros_like(area)) for pair in PAIRS]
+
+
+def _volume_density(space: Space, r: LocalResponse, work: Array, n: int) -> dict[tuple[int, int], Array]:
+    """Second derivatives of the enclosed volume over 2 pi, times ``work``."""
+    if space.lids and (n == 0 or space.spreads):
+        return {
+            (_A, _A): -work * r.eta_x,
+            (_A, _C): -n * work * r.eta_x,
+            (_A, _BX): -work * r.rho,
+            (_C, _C): -work * r.eta_x,
+            (_C, _B): n / 2 * work * r.rho_x,
+            (_C, _BX): -n / 2 * work * r.rho,
+            (_CX, _B): -n / 2 * work * r.rho,
+        }
+    return _projected_density(r, work * r.eta, work, n)
+
+
+def _projected_density(r: LocalResponse, g: Array, g_z: Array, n: int) -> dict[tuple[int, int], Array]:
+    """Second derivatives of an energy g(eta) over the projected area, but for those of g', from weighted g and g' at the points."""
+    return {
+        (_A, _AX): g,
+        (_A, _CX): n * g,
+        (_A, _B): g_z * r.rho_x,
+        (_AX, _C): n * g,
+        (_AX, _B): g_z * r.rho,
+        (_C, _CX): g,
+        (_C, _B): n * g_z * r.rho_x,
+    }

@@ -1,0 +1,148 @@
+"""Unknowns of perturbations with n waves around the axis: their supports, their numbering along the meridian, and their shapes.
+
+They are the coefficients of (a, c, b) at the nodes, see :mod:`.second_variation`. What ends on the axis allow depends on n = 0, 1, or more.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..discretization.numbering import band_of
+from ..discretization.space import Space
+from ..potential import Array
+from .second_variation import PAIRS, VALUES
+
+#: the fields a (radial), c (around the axis) and b (vertical) in the order of their coefficients
+RADIAL, AROUND, VERTICAL = range(3)
+
+
+class WaveUnknowns:
+    """What depends on the space and on min(n, 2) alone: supports, numbering, tables, mass."""
+
+    def __init__(self, space: Space, kind: int) -> None:
+        degree, n_elements = space.degree, space.n_elements
+        n_local = degree + 1
+        nodes = space.nodes[degree * np.arange(n_elements) + np.arange(n_local)[:, None]]
+        free, opposite = _supports(space, kind)
+        self.n_free = int(free.sum())
+        self.numbers: NDArray[np.int64] = np.full((space.n_nodes, 3), self.n_free, dtype=np.int64)
+        self.numbers[free] = np.arange(self.n_free)
+        self.numbers[opposite, AROUND] = self.numbers[opposite, RADIAL]
+        #: local row of c and element where c = -a on the axis
+        self.flips = [(n_local, 0) if node == 0 else (2 * n_local - 1, n_elements - 1) for node in opposite]
+        self.gather = np.concatenate([self.numbers[nodes, k] for k in range(3)])
+        open_curve = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
+        self.half_bandwidth = band_of(self.gather, self.n_free) if space.closed else open_curve
+        self._tabulate(space)
+        area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        zero = np.zeros_like(area)
+        self.mass = self.assemble(np.stack([area if i == j and i in VALUES else zero for i, j in PAIRS]))
+        self.mass.flags.writeable = False
+        points = (space.interpolation_points()[:, 0] - space.mesh.breakpoints()[0]) / np.diff(space.mesh.breakpoints())[0]
+        self.node_values = space.shape_functions(points)[0]
+
+    def _tabulate(self, space: Space) -> None:
+        n_local = space.degree + 1
+        rows = np.zeros((6, space.n_quadrature, 3 * n_local))
+        for field in range(3):
+            columns = slice(field * n_local, (field + 1) * n_local)
+            rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
+            rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
+        self._values = space.table[: space.n_quadrature, :n_local]
+        outer = []
+        for i, j in PAIRS:
+            product = np.einsum("qa,qb->abq", rows[i], rows[j])
+            outer.append(product if i == j else product + product.transpose(1, 0, 2))
+        self._table = np.ascontiguousarray(np.stack(outer, axis=2).reshape((3 * n_local) ** 2, -1))
+        kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
+        row, column = np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :])
+        inside = (row < self.n_free) & (column < self.n_free)
+        self._band_index = np.where(inside, column * depth + 2 * kd + row - column, self.n_free * depth).ravel()
+
+    def assemble(self, density: Array) -> Array:
+        """Integrate second derivatives in the order of PAIRS, shape (18, n_quadrature, n_elements), to a band matrix."""
+        n_elements, n_local = density.shape[-1], self.gather.shape[0]
+        local = (self._table @ density.reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
+        for row, element in self.flips:
+            local[row, :, element] *= -1
+            local[:, row, element] *= -1
+        depth = 3 * self.half_bandwidth + 1
+        flat: Array = np.bincount(self._band_index, local.ravel(), self.n_free * depth + 1)  # type: ignore[assignment]  # weighted: floats
+        return flat[:-1].reshape(self.n_free, depth).T
+
+    def integrate(self, density: Array) -> Array:
+        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions."""
+        local = np.concatenate([self._values.T @ part for part in density])
+        for row, element in self.flips:
+            local[row, element] *= -1
+        total: Array = np.bincount(self.gather.ravel(), local.ravel(), self.n_free + 1)  # type: ignore[assignment]  # weighted: floats
+        return total[: self.n_free]
+
+    def local(self, mode: Array) -> Array:
+        """Coefficients of (a, c, b) in each element, shape (3 (degree + 1), n_elements)."""
+        local = np.append(mode, 0.0)[self.gather]
+        for row, element in self.flips:
+            local[row, element] *= -1
+        return local
+
+
+@lru_cache(maxsize=32)
+def wave_unknowns(space: Space, kind: int) -> WaveUnknowns:
+    """The unknowns of n waves in a space, ``kind`` = min(n, 2), remembered."""
+    return WaveUnknowns(space, kind)
+
+
+def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
+    """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
+
+    What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
+    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no
+    perturbations: one node is held against them, which takes none of the others away.
+    """
+    free = np.ones((space.n_nodes, 3), dtype=bool)
+    opposite = []
+    for node, support, on_axis in zip(space.nodes[[0, -1]].tolist(), space.supports, space.on_axis.tolist(), strict=False):
+        in_plane, vertical = "u" not in support.held, "w" not in support.held
+        if on_axis:
+            rigid = kind == 1 and vertical  # a pole that is held vertically is a fixed point
+            free[node] = [rigid, False, kind == 0 and vertical]
+            opposite += [node] if rigid else []
+        else:
+            free[node] = [in_plane, in_plane, vertical] if kind == 0 or not support.rigid else False
+    pinned = space.nodes[space.widest]
+    if kind == 0:
+        free[:, AROUND] = False
+        if space.pin is not None:
+            free[pinned, VERTICAL] = False
+    if kind == 1:  # at this radius a shift is seen in c, a tilt in b
+        shift, tilt = space.rotations
+        free[pinned, AROUND] &= not shift
+        free[pinned, VERTICAL] &= not tilt
+    return free, opposite
+
+
+def azimuthal_shape(space: Space, n: int, mode: Array) -> dict[str, Array]:
+    """A mode at the nodes along the meridian: r (reference radius), u (radial), c (circumferential), w (vertical)."""
+    layout = wave_unknowns(space, min(n, 2))
+    nodes = layout.node_values @ layout.local(mode).reshape(3, space.degree + 1, -1)
+    a, c, b = np.concatenate([nodes[:, :-1].transpose(0, 2, 1).reshape(3, -1), nodes[:, -1, -1:]], axis=1)
+    return {"r": space.mesh.position(space.node_parameters())[0], "u": a, "c": c, "w": b}
+
+
+def mode_in(space: Space, n: int, mode: Array, onto: Space) -> Array:
+    """Coefficients in another space of the interpolant of a mode."""
+    kind = min(n, 2)
+    source, target = wave_unknowns(space, kind), wave_unknowns(onto, kind)
+    points = onto.interpolation_points()
+    element, xi = space.locate(points.ravel())
+    fields = source.local(mode).reshape(3, space.degree + 1, -1)[:, :, element]
+    values = np.einsum("qa,faq->fq", space.shape_functions(xi)[0], fields).reshape(3, *points.shape)
+    local = np.concatenate(onto.from_values @ values)
+    for row, at in target.flips:
+        local[row, at] *= -1
+    coefficients = np.zeros(target.n_free + 1)
+    coefficients[target.gather] = local
+    return coefficients[:-1]

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, BorderedFactor, CompiledBorder
-from .controls import ArcLengthControl, Control
+from .controls import ArcLengthControl, Control, VolumeControl
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
@@ -18,6 +18,8 @@ RESIDUAL = 1e-12
 #: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it: one along which
 #: the membrane is so soft, such as a shift of a bulge in a long tube, that round-off decides it
 ROUND_OFF, SOFT = 2e-14, 1e-4
+#: residual from which on corrections along a soft direction go on, in the hope of one that ends in balance
+NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 #: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
@@ -85,9 +87,10 @@ def correct(
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
         stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
-        if stalled and size <= SOFT and not done:
+        if stalled and size <= 100 * SOFT and not done:
             before, unbalance = unbalance, equations.residual
-            stalled = unbalance > 1e-2 * before  # along a soft direction corrections are round-off while forces still come into balance
+            # along a soft direction corrections are round-off while forces still come into balance, or stay all but balanced
+            stalled = unbalance > max(1e-2 * before, NEARLY_BALANCED * potential.space.slenderness)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
@@ -121,6 +124,7 @@ class Equations:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
+        self._round_off = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.stiffness_density).all())
         if bordered is None and self.finite:
             bordered = bordered_factor(evaluation, self._row, self._corner)
@@ -132,7 +136,7 @@ class Equations:
         if isinstance(self.control, ArcLengthControl):
             return True
         terms = abs(self._row @ self.x) + abs(self._corner * self.pressure)
-        return bool(abs(self.gap) <= 1e-14 * self.potential.space.slenderness * terms)
+        return bool(abs(self.gap) <= max(1e-14 * self.potential.space.slenderness * terms, self._round_off))
 
     @property
     def at_round_off(self) -> bool:
@@ -149,7 +153,8 @@ class Equations:
         return bool(abs(dp) * max(self.potential.largest(self.evaluation.volume_gradient)) <= PRESSURE * scale)
 
     def newton_step(self) -> tuple[Array, float]:
-        return self._factored.solve(-self.force, -self.gap)
+        gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
+        return self._factored.solve(-self.force, -gap)
 
     def size(self, dx: Array) -> float:
         """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""

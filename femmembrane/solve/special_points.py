@@ -206,7 +206,7 @@ class Segment:
     def _through_flat(self) -> bool:
         """Whether the segment leads to the mirror side of the flat membrane at rest, which no corrector finds."""
         mirrored = all(self.value(q, self.a) * self.value(q, self.b) < 0 for q in FOLDS.values())
-        return mirrored and rests_flat(self.potential)
+        return mirrored and self.potential.flat and rests_flat(self.potential)
 
 
 def branches_crossing(segment: Segment) -> int:

@@ -102,7 +102,15 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
     failures.sort(key=lambda f: order.index(f.status) if f.status in order else len(order))
     said = f" (first: {failures[0]})" if failures else ""
     status = failures[0].status if failures else Status.NO_EQUILIBRIUM
-    raise SolveError(f"no equilibrium was found at {wanted}; tried: {', '.join(tried)}{said}", status=status)
+    raise SolveError(f"no equilibrium was found at {wanted}; tried: {_in_few_words(tried)}{said}", status=status)
+
+
+def _in_few_words(tried: list[str]) -> str:
+    """The ways that were tried; of several of a kind the number, and the first."""
+    kinds: dict[str, list[str]] = {}
+    for name in tried:
+        kinds.setdefault(name.split(" = ")[0], []).append(name)
+    return ", ".join(f"{names[0]} and {len(names) - 1} more" if len(names) > 1 else names[0] for names in kinds.values())
 
 
 def _adrift(state: State) -> bool:
@@ -153,7 +161,7 @@ def _with_fields(potential: Potential, volume: float) -> State:
             state = follow_homotopy(Held(potential, control, x, bare.pressure), x, bare.pressure)
         if state is None:
             raise SolveError(
-                f"no place was found in which sources and loads hold the membrane at V = {volume:.6g}; nothing else holds it along the axis",
+                f"no place was found in which sources and loads hold the membrane at V = {volume:.6g}; nothing else does along the axis",
                 status=Status.NO_EQUILIBRIUM,
             )
         return state

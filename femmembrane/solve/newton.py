@@ -124,7 +124,7 @@ class Equations:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.force = evaluation.gradient - pressure * evaluation.volume_gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
-        self._round_off = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
+        self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = bool(np.isfinite(self.force).all() and np.isfinite(evaluation.stiffness_density).all())
         if bordered is None and self.finite:
             bordered = bordered_factor(evaluation, self._row, self._corner)
@@ -135,7 +135,7 @@ class Equations:
         """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
         if isinstance(self.control, ArcLengthControl):
             return True
-        terms = abs(self._row @ self.x) + abs(self._corner * self.pressure)
+        terms = float(abs(self._row @ self.x) + abs(self._corner * self.pressure))
         return bool(abs(self.gap) <= max(1e-14 * self.potential.space.slenderness * terms, self._round_off))
 
     @property

@@ -7,6 +7,7 @@ exists, on the mesh of the test. :mod:`.verification.test_population` asks many 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -234,9 +235,10 @@ def test_a_long_bulged_tube_is_found_cold(volume, pressure):
     assert fm.equilibrium(bulging(20.0, 120), volume=volume, solver="newton").pressure == pytest.approx(pressure, rel=1e-6)
 
 
-def test_arc_length_passes_along_a_long_bulged_tube():
+@pytest.mark.parametrize("start", [70.0, 71.0, 72.5, 80.0])
+def test_arc_length_passes_along_a_long_bulged_tube(start: float) -> None:
     """A bulge far from both ends can shift at hardly any cost: the Hessian is nearly singular all along the branch."""
-    branch = fm.trace(bulging(20.0, 120), start=70.0, until={"volume": 1600.0}, special_points=False, max_steps=1000)
+    branch = fm.trace(bulging(20.0, 120), start=start, until={"volume": 1600.0}, special_points=False, max_steps=1000)
     assert branch.status is fm.Status.CONVERGED
     assert branch[-1].pressure == pytest.approx(0.3810405476707, rel=1e-6)
 
@@ -253,3 +255,24 @@ def test_a_weight_on_a_sliding_rim_leaves_one_rigid_motion(solver):
     verdict = eq.verdict(azimuthal=1)
     assert verdict.stable is True
     assert verdict.smallest_eigenvalue == pytest.approx(0.98369, abs=2e-5)
+
+
+@pytest.mark.parametrize("solver", ["newton", "ipopt"])
+@pytest.mark.parametrize("mesh", [fm.cap(0.6, 16), fm.sphere(12), fm.cylinder(2.0, 12), fm.torus(264.535, 21)], ids=lambda m: m.shape)
+def test_the_volume_at_rest_asks_for_nothing(mesh: Any, solver: str) -> None:
+    """It is known to round-off only, which moves nothing: P = 0 exactly at rest, and next to it P grows with the volume."""
+    scene = fm.Scene(material=fm.MooneyRivlin(0.1), mesh=mesh, degree=2)
+    rest = fm.equilibrium(scene, pressure=0.0, solver="newton").volume
+    assert fm.equilibrium(scene, volume=rest, solver=solver).pressure == pytest.approx(0.0, abs=1e-12)
+    near = [fm.equilibrium(scene, volume=rest * (1 + part), solver=solver).pressure for part in (1e-7, 2e-7)]
+    assert near[1] == pytest.approx(2 * near[0], rel=1e-5)
+
+
+def test_a_cap_whose_pole_is_in_the_plane_of_its_rim_is_not_at_rest() -> None:
+    """Pressure, volume and pole height of a dome that is pushed in pass zero close together, but it is no flat membrane there."""
+    scene = fm.Scene(material=fm.MooneyRivlin(0.1), mesh=fm.cap(0.6, 16), degree=2)
+    found = fm.equilibrium(scene, center_height=0.0)
+    beside = [fm.equilibrium(scene, center_height=h) for h in (-1e-3, 1e-3)]
+    assert found.center_height == pytest.approx(0.0, abs=1e-12)
+    assert found.pressure == pytest.approx((beside[0].pressure + beside[1].pressure) / 2, rel=1e-2)
+    assert found.volume == pytest.approx((beside[0].volume + beside[1].volume) / 2, rel=1e-2)

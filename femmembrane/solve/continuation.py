@@ -16,11 +16,13 @@ from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from .banded import BorderedFactor, band_product
 from .controls import CONTROLS, ArcLengthControl, Controlled
-from .newton import correct
+from .newton import TOLERANCE, correct
 from .state import Predictor, State, inner
 
 #: smallest step relative to the arc length so far
 ROUND_OFF = 1e-14
+#: times the error of a point that a prediction from the points before may miss
+_BOTH_ENDS = 10.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,9 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
     if result.status is not Status.CONVERGED:
         return None, result.iterations, 0.5
     miss = math.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
+    if result.correction > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
+        known = result.correction * math.sqrt(max(_square(potential, result.x, result.pressure), 0.0))
+        miss = max(miss - _BOTH_ENDS * known / step, 0.0)
     state = State.of(result)
     if potential.passed_source(point.state.x, state.x):
         return None, result.iterations, 0.5

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import Status
 from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
-from .controls import ArcLengthControl, Control
+from .controls import ArcLengthControl, Control, VolumeControl
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
@@ -19,6 +19,8 @@ RESIDUAL = 1e-12
 #: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it: one along which
 #: the membrane is so soft, such as a shift of a bulge in a long tube, that round-off decides it
 ROUND_OFF, SOFT = 2e-14, 1e-4
+#: residual from which on corrections along a soft direction go on, in the hope of one that ends in balance
+NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
@@ -88,9 +90,10 @@ def correct(
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
         stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
-        if stalled and size <= SOFT and not done:
+        if stalled and size <= 100 * SOFT and not done:
             before, unbalance = unbalance, equations.residual
-            stalled = unbalance > 1e-2 * before  # along a soft direction corrections are round-off while forces still come into balance
+            # along a soft direction corrections are round-off while forces still come into balance, or stay all but balanced
+            stalled = unbalance > max(1e-2 * before, NEARLY_BALANCED * potential.space.slenderness)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
@@ -114,7 +117,7 @@ class Equations:
 
     __slots__ = (
         *("potential", "control", "x", "pressure", "evaluation", "bordered"),
-        *("unbalanced", "gap", "finite", "_row", "_corner", "_scales"),
+        *("unbalanced", "gap", "finite", "_row", "_corner", "_round_off", "_scales"),
     )
 
     def __init__(
@@ -129,6 +132,7 @@ class Equations:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
+        self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = evaluation.finite and math.isfinite(pressure)
         self.bordered = evaluation.border(self._row, self._corner) if bordered is None and self.finite else bordered
         self._scales: tuple[float, float] | None = None
@@ -138,8 +142,8 @@ class Equations:
         """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
         if isinstance(self.control, ArcLengthControl):
             return True
-        terms = abs(self._row @ self.x) + abs(self._corner * self.pressure)
-        return bool(abs(self.gap) <= 1e-14 * self.potential.space.slenderness * terms)
+        terms = float(abs(self._row @ self.x) + abs(self._corner * self.pressure))
+        return bool(abs(self.gap) <= max(1e-14 * self.potential.space.slenderness * terms, self._round_off))
 
     @property
     def at_round_off(self) -> bool:
@@ -167,7 +171,8 @@ class Equations:
         return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
     def newton_step(self) -> tuple[Array, float]:
-        return self._factored.solve(self.unbalanced, -self.gap)
+        gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
+        return self._factored.solve(self.unbalanced, -gap)
 
     def size(self, dx: Array) -> float:
         """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""

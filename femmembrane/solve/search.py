@@ -14,7 +14,7 @@ from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_p
 from .controls import CONTROLS, Control, VolumeControl
 from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, relative_size
-from .special_points import FOLDS, Located, Segment, branch_points
+from .special_points import FOLDS, Located, Segment, branch_points, branches_crossing
 from .start import moderate, start_at_volume
 from .state import Predictor, State, at_rest, distance, flat_state
 from .state_resolution import unresolved
@@ -238,9 +238,9 @@ def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_
 
 def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
     """The branch points on a segment that can be located, but for those of folded shapes of the mesh."""
-    if all(ill_posed(potential, point.state.evaluation) for point in (segment.a, segment.b)):
-        return []
     try:
+        if not branches_crossing(segment) or all(ill_posed(potential, point.state.evaluation) for point in (segment.a, segment.b)):
+            return []
         located = branch_points(segment)
     except SolveError:  # of a limit point on the segment
         return []

@@ -198,7 +198,7 @@ class Segment:
     def _through_flat(self) -> bool:
         """Whether the segment leads to the mirror side of the flat membrane at rest, which no corrector finds."""
         mirrored = all(self.value(q, self.a) * self.value(q, self.b) < 0 for q in FOLDS.values())
-        return mirrored and rests_flat(self.potential)
+        return mirrored and self.potential.flat and rests_flat(self.potential)
 
 
 def branches_crossing(segment: Segment) -> int:
@@ -210,10 +210,12 @@ def branches_crossing(segment: Segment) -> int:
     if segment.leaving:
         return 0
     turns = len(segment.folds("limit_point"))
+    before, after = (point.state.evaluation.negative for point in (segment.a, segment.b))
+    if before == after and turns % 2 == 0:  # asked first, for whether a state is ill-posed may need finer meshes
+        return 0
     if any(ill_posed(segment.potential, point.state.evaluation) for point in (segment.a, segment.b)):
         signs = [point.state.factor.determinant_sign() for point in (segment.a, segment.b)]
         return int((signs[0] != signs[1]) != (turns % 2 == 1))
-    before, after = (point.state.evaluation.negative for point in (segment.a, segment.b))
     surplus = abs(after - before) - turns
     return surplus if surplus > 0 else surplus % 2
 

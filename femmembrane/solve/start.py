@@ -28,7 +28,7 @@ from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
-from .newton import correct
+from .newton import NEGLIGIBLE, correct
 from .special_points import Segment
 from .state import Predictor, State, at_rest, flat_state, inner
 from .stepping import march
@@ -112,6 +112,9 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
         except SolveError as error:
             failures.append(error)
             continue
+        if state is not None and _adrift(state):
+            failures.append(SolveError("it drifts off to where sources and loads no longer hold it", status=Status.NO_EQUILIBRIUM))
+            continue
         if state is not None and _well_posed(state):
             return state
         spare = spare or state
@@ -121,7 +124,25 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
     failures.sort(key=lambda f: order.index(f.status) if f.status in order else len(order))
     said = f" (first: {failures[0]})" if failures else ""
     status = failures[0].status if failures else Status.NO_EQUILIBRIUM
-    raise SolveError(f"no equilibrium was found at {wanted}; tried: {', '.join(tried)}{said}", status=status)
+    raise SolveError(f"no equilibrium was found at {wanted}; tried: {_in_few_words(tried)}{said}", status=status)
+
+
+def _in_few_words(tried: list[str]) -> str:
+    """The ways that were tried; of several of a kind the number, and the first."""
+    kinds: dict[str, list[str]] = {}
+    for name in tried:
+        kinds.setdefault(name.split(" = ")[0], []).append(name)
+    return ", ".join(f"{names[0]} and {len(names) - 1} more" if len(names) > 1 else names[0] for names in kinds.values())
+
+
+def _adrift(state: State) -> bool:
+    """Whether a membrane that sources and loads alone could hold along the axis is so far from them that what they pull is round-off."""
+    potential, evaluation = state.evaluation.potential, state.evaluation
+    if not potential.space.loose:
+        return False
+    bare = potential.evaluate(state.x, state.pressure, 0.0)
+    pull = max(potential.largest(evaluation.gradient - bare.gradient))
+    return pull <= NEGLIGIBLE * max(potential.force_scale(evaluation, state.pressure))
 
 
 def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, Way]]:
@@ -162,7 +183,7 @@ def _with_fields(potential: Potential, volume: float) -> State:
             state = follow_homotopy(Held(potential, control, x, bare.pressure), x, bare.pressure)
         if state is None:
             raise SolveError(
-                f"no place was found in which the sources hold the membrane at V = {volume:.6g}; nothing else holds it along the axis",
+                f"no place was found in which sources and loads hold the membrane at V = {volume:.6g}; nothing else does along the axis",
                 status=Status.NO_EQUILIBRIUM,
             )
         return state

@@ -57,9 +57,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files; what a notebook has put there need not exist here
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()  # what does not fit on the disk is told here, not by Python at its end
     except CycloptsError as error:
         return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
-        sys.stdout.flush()
     except BrokenPipeError:  # whoever reads the pipe has seen enough
         drop(sys.stdout)
         return DONE

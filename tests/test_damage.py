@@ -245,6 +245,16 @@ def test_no_damaged_branch_is_read(count, tmp_path, done):
     refused(tmp_path / "branch.nc", fm.load, damaged((done / "branch.nc").read_bytes(), 1, count))
 
 
+@pytest.mark.parametrize("content", [b"", b"text", None])
+def test_a_run_whose_branch_is_damaged_is_not_said_to_be_done(content, tmp_path, done, capfd):
+    out = tmp_path / "o"
+    shutil.copytree(done, out)
+    branch = out / "branch.nc"
+    branch.write_bytes(branch.read_bytes()[:-1000] if content is None else content)
+    assert main(["run", str(done.parent / "scene.toml"), "--resume", "--out", str(out)]) == 2
+    assert "a NetCDF file written by femmembrane is needed" in said(capfd)
+
+
 def test_what_was_changed_on_purpose_is_refused_as_well(tmp_path, done):
     """A variable taken out, a number changed: by a program that leaves a file in good order."""
     import h5py

@@ -8,6 +8,7 @@ import random
 import shutil
 import signal
 import sqlite3
+import stat
 import subprocess
 import sys
 import time
@@ -119,23 +120,53 @@ def test_surfaces_are_neither_written_nor_removed_elsewhere(scene, tmp_path, cap
     assert [(p.name, p.read_text(encoding="utf-8")) for p in other.iterdir()] == [("membrane_0007.vtu", "mine")]
 
 
-def test_links_and_pipes_in_the_place_of_results_are_replaced(scene, tmp_path, old):
-    out, precious = tmp_path / "o", tmp_path / "precious.txt"
-    out.mkdir()
+@pytest.mark.parametrize("kind", ["link", "dangling link", "pipe", "device", "folder"])
+def test_nothing_but_a_regular_file_is_replaced(kind, scene, done, tmp_path, capfd, monkeypatch, old):
+    precious, out = tmp_path / "precious.txt", tmp_path / "o"
     precious.write_text("precious", encoding="utf-8")
-    (out / "branch.csv").symlink_to("../precious.txt")
-    (out / "zones.csv").symlink_to("../precious.txt")  # which this run does not write, and removes
-    (out / "branch.nc").hardlink_to(precious)
-    os.mkfifo(out / "run.json")
-    (out / "pressure-volume.png").symlink_to("/dev/null")
-    assert main(["run", str(scene), "--out", str(out)]) == 0
-    assert precious.read_text(encoding="utf-8") == "precious"
-    assert all(path.is_file() and not path.is_symlink() for path in out.iterdir() if path.name != "membrane")
-    assert len(fm.load(out / "branch.nc")) == 3
-    scene.unlink()
-    scene.symlink_to(precious)
-    old.scene.to_toml(scene)
-    assert precious.read_text(encoding="utf-8") == "precious"
+    out.mkdir()
+
+    def put(path):
+        made = {
+            "link": lambda: path.symlink_to(precious),
+            "dangling link": lambda: path.symlink_to(tmp_path / "nothing"),
+            "pipe": lambda: os.mkfifo(path),
+            "device": lambda: os.mknod(path, 0o600 | stat.S_IFCHR, os.makedev(1, 3)),
+            "folder": path.mkdir,
+        }
+        try:
+            made[kind]()
+        except PermissionError:
+            pytest.skip("devices are made by root alone")
+        return path
+
+    def kept(path, facts):
+        after = path.lstat()
+        return (after.st_mode, after.st_ino) == (facts.st_mode, facts.st_ino) and precious.read_text(encoding="utf-8") == "precious"
+
+    for command in (
+        ["report", str(done), "--out", "x.html"],
+        ["export", str(done), "--to", "csv", "--out", "x.csv"],
+        ["export", str(done), "--to", "xdmf", "--out", "x.xdmf"],
+        ["export", str(done), "--to", "stl", "--out", "x.stl"],
+    ):
+        path = put(tmp_path / command[-1])
+        facts = path.lstat()
+        assert main([*command[:-1], str(path)]) == 2
+        assert "which no file replaces" in said(capfd)
+        assert kept(path, facts)
+    for write in (old.save, old.plot, old.scene.to_toml):
+        path = put(tmp_path / f"{write.__name__}.png")
+        facts = path.lstat()
+        with pytest.raises(InputError, match="which no file replaces"):
+            write(path)
+        assert kept(path, facts)
+    monkeypatch.setattr("femmembrane.verbs.run", None)  # a run is refused before anything is computed
+    path = put(out / "branch.csv")
+    facts = path.lstat()
+    assert main(["run", str(scene), "--out", str(out)]) == 2
+    assert "branch.csv in it is a" in said(capfd)
+    assert kept(path, facts)
 
 
 def test_a_folder_in_the_place_of_a_result_is_refused_before_anything_is_computed(scene, tmp_path, capfd, monkeypatch):
@@ -212,6 +243,16 @@ def refused(path, read, contents):
 @pytest.mark.parametrize("count", [300, pytest.param(5000, marks=pytest.mark.slow)])
 def test_no_damaged_branch_is_read(count, tmp_path, done):
     refused(tmp_path / "branch.nc", fm.load, damaged((done / "branch.nc").read_bytes(), 1, count))
+
+
+@pytest.mark.parametrize("content", [b"", b"text", None])
+def test_a_run_whose_branch_is_damaged_is_not_said_to_be_done(content, tmp_path, done, capfd):
+    out = tmp_path / "o"
+    shutil.copytree(done, out)
+    branch = out / "branch.nc"
+    branch.write_bytes(branch.read_bytes()[:-1000] if content is None else content)
+    assert main(["run", str(done.parent / "scene.toml"), "--resume", "--out", str(out)]) == 2
+    assert "a NetCDF file written by femmembrane is needed" in said(capfd)
 
 
 def test_what_was_changed_on_purpose_is_refused_as_well(tmp_path, done):

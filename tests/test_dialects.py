@@ -70,6 +70,54 @@ def test_lines_in_two_groups_are_taken_once_and_that_is_said() -> None:
     assert branch.notes[0] == "mesh: 6 cells that are listed more than once were taken once"
 
 
+PARTITIONED = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+1 7 "wall"
+$EndPhysicalNames
+$Entities
+0 1 0 0
+1 0 0 0 1 2 0 1 7 0
+$EndEntities
+$PartitionedEntities
+2
+0
+0 2 0 0
+2 1 1 1 1 0 0 0 1 1 0 1 7 0
+3 1 1 2 1 2 0 1 0 1 2 0 1 7 0
+$EndPartitionedEntities
+$Nodes
+2 4 1 4
+1 2 0 2
+1
+2
+0 0 0
+1 0 0
+1 3 0 2
+3
+4
+1 2 0
+0 2 0
+$EndNodes
+$Elements
+2 3 1 3
+1 2 1 2
+1 1 2
+2 2 3
+1 3 1 1
+3 3 4
+$EndElements
+"""
+
+
+def test_a_mesh_that_gmsh_has_divided_for_processors_keeps_its_groups(tmp_path: Path) -> None:
+    path = tmp_path / "a.msh"
+    path.write_text(PARTITIONED, encoding="utf-8")
+    assert fm.read_meridian(path, group="wall").points == ((0, 2), (1, 2), (1, 0), (0, 0))
+
+
 # --- VTK
 
 
@@ -121,6 +169,7 @@ def test_xml_files_of_vtk(suffix: str, mode: str, packer: str, tmp_path: Path) -
 def test_older_files_of_vtk(grid: bool, mode: str, version: int, tmp_path: Path) -> None:
     data = polydata(in_plane(QUARTER), [[0, 1, 2], [3, 2], [3, 4, 5, 6]])
     data.field_data["time"] = [0.5]
+    data.field_data["made by"] = ["a program of a long name " * 4, "x", "POINTS 3 float"]
     data.point_data["height"] = QUARTER[:, 1]
     if grid:
         data = data.cast_to_unstructured_grid()
@@ -336,6 +385,75 @@ def test_the_direction_of_a_curve_does_not_hang_on_round_off() -> None:
             moved = points + np.random.default_rng(seed).uniform(-1e-15, 1e-15, points.shape)
             starts.add(tuple(np.round(fm.meridian_from_points(moved).points[0], 9).tolist()))
         assert len(starts) == 1
+
+
+# --- Abaqus, in parts
+
+
+PARTS = """*Heading
+ two parts, numbered anew each
+*Part, name=Lower
+*Node
+ 1, 0., 0., 0.
+ 2, 1., 0., 0.
+ 3, 1., 1., 0.
+*Element, type=SAX1
+1, 1, 2
+2, 2,
+3
+*Elset, elset=side, generate
+ 2, 2, 1
+*End Part
+*Part, name=Upper
+*Node
+ 1, 1., 1., 0.
+ 2, 1., 2., 0.
+ 3, 0., 2., 0.
+*Element, type=SAX1
+1, 1, 2
+2, 2, 3
+*End Part
+*Assembly, name=Assembly
+*Instance, name=Lower-1, part=Lower
+*End Instance
+*Instance, name=Upper-1, part=Upper
+*End Instance
+*Node
+ 1, 7., 7., 0.
+*Elset, elset=side, instance=Upper-1
+ 1,
+*Nset, nset=n, instance=Upper-1
+ 1, 2
+*End Assembly
+*Step
+*Static
+1., 1.
+*End Step
+"""
+
+
+def test_parts_of_abaqus_have_numbers_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "a.inp"
+    path.write_text(PARTS, encoding="utf-8")
+    assert fm.read_meridian(path).points == ((0, 2), (1, 2), (1, 1), (1, 0), (0, 0))
+    assert fm.read_meridian(path, group="side").points == ((1, 2), (1, 1), (1, 0))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("part=Upper\n", "part=Upper\n 5., 0., 0.\n", "is moved"),
+        ("name=Upper-1, part=Upper", "name=Upper-1, part=Lower", "two instances"),
+        ("*Element, type", "*Ngen\n1, 3\n*Element, type", r"\*Ngen"),
+        ("*Node\n", "*Node, system=C\n", "moves nodes"),
+        ("*Node\n", "*Node, input=nodes.txt\n", "includes another file"),
+    ],
+)
+def test_nodes_of_abaqus_that_are_not_listed_in_place_are_refused(old: str, new: str, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.inp"
+    path.write_text(PARTS.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(fm.InputError, match=told):
+        fm.read_meridian(path)
 
 
 # --- damaged files

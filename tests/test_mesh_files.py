@@ -261,3 +261,9 @@ def test_a_curve_is_checked_and_directed_when_it_is_made() -> None:
     assert fm.Curve(points=[(0, -1), (1, 0), (0, 1)]).points[0] == (0.0, 1.0)  # between two poles so that the volume is positive
     ring = fm.Curve(points=[(1, 0), (2, -1), (3, 0), (2, 1), (1, 0)])
     assert ring.points == ((2.0, 1.0), (3.0, 0.0), (2.0, -1.0), (1.0, 0.0), (2.0, 1.0))
+
+
+@pytest.mark.parametrize("size", [1e300, 1e200, 1e-200, 1e-320, 0.0])
+def test_points_whose_squares_are_no_numbers_are_refused(size):
+    with pytest.raises(fm.InputError, match=r"mesh\.points"):
+        fm.meridian_from_points([(0.0, 0.0), (size, 0.0)])

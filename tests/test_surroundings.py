@@ -132,3 +132,14 @@ def test_any_title_is_drawn_as_it_stands(title, tmp_path):
     assert shown == " ".join(title.split()) or (len(shown) <= 120 and shown.endswith("…"))
     branch.save(tmp_path / "branch.nc")
     assert fm.load(tmp_path / "branch.nc").scene.title == title
+
+
+def test_a_folder_of_fonts_that_cannot_be_made_is_no_matter_for_a_message(scene, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "femmembrane", "run", str(scene), "--out", str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "MPLCONFIGDIR": str(scene)},
+    )
+    assert (done.returncode, done.stderr) == (0, "")

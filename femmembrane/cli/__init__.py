@@ -8,6 +8,7 @@ inside its functions, for ``--help`` should answer at once.
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -55,11 +56,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     open_streams()
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files; what a notebook has put there need not exist here
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where it keeps its list of fonts is no matter for a message
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()  # what does not fit on the disk is told here, not by Python at its end
     except CycloptsError as error:
         return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
-        sys.stdout.flush()
     except BrokenPipeError:  # whoever reads the pipe has seen enough
         drop(sys.stdout)
         return DONE

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
-from .folders import Changes, read, working
+from .folders import Changes, finished, read, working
 from .interrupts import Interrupts
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
 from .progress import observer
@@ -91,6 +91,8 @@ def _ended(scene: Scene, out: Path) -> int | None:
     refuse_others(scene, facts["scene"], "--resume")
     if facts["status"] == Status.INTERRUPTED:
         return None
+    if facts["equilibria"]:
+        finished(out)  # what is damaged is refused here, and not said to be done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)

@@ -34,6 +34,8 @@ from .supports import POLE, SUPPORTS, Support, check_support
 
 #: kinds of files that are written, and read as well, by their suffix; with the format that meshio is to write
 FORMATS = {".vtu": "vtu", ".msh": "gmsh", ".vtk": "vtk", ".xdmf": "xdmf"}
+#: size of a curve beyond which squares and cubes of it are no numbers any more, and below the inverse of which they are zero
+_LARGEST = 1e60
 #: points and weights for the length of a curved cell
 _GAUSS = np.polynomial.legendre.leggauss(12)
 
@@ -79,6 +81,9 @@ class Curve:
             raise InputError("mesh.divisions", self.divisions, error.allowed) from None
         for name in ("first", "last"):
             check_support(f"mesh.{name}", getattr(self, name))
+        size = extent(*np.array(self.points).T)
+        if np.isfinite(size) and not 1 / _LARGEST <= size <= _LARGEST:
+            raise InputError("mesh.points", f"a size of {size:.3g}", f"a size from {1 / _LARGEST:.0e} to {_LARGEST:.0e} is allowed")
         points, remarks = mended(np.array(self.points), 2 if self.curved else 1)
         object.__setattr__(self, "points", _tuples(points))
         object.__setattr__(self, "repaired", self.repaired + remarks)

@@ -39,6 +39,15 @@ _DIGITS = 64
 _LEFTOVER = re.compile(r"\.femmembrane-[0-9a-f]{16}(\..*)?")
 #: seconds after which a file of unknown owner counts as left behind, where the system has no locks that say so
 _OLD = 86400.0
+#: what is no regular file
+_KINDS = {
+    stat.S_IFLNK: "a link",
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 _READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _OWN = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
@@ -162,7 +171,7 @@ def refuse_strange(path: Path) -> None:
     except OSError:
         return
     if not stat.S_ISREG(facts.st_mode):
-        raise _unusable(path, "a link" if stat.S_ISLNK(facts.st_mode) else "no regular file")
+        raise _unusable(path, strange(path) or "no regular file")
     if facts.st_nlink > 1:
         raise _unusable(path, "it has a second name elsewhere")
 
@@ -172,19 +181,27 @@ def _unusable(path: Path, reason: str) -> InputError:
 
 
 def refuse_obstacles(folder: Path, names: Iterable[str], folders: Iterable[str] = ()) -> None:
-    """Refuse a folder in which results could not take their places; a link or a pipe with the name of a file is replaced, and no obstacle.
+    """Refuse a folder in which results could not take their places.
 
     Raises
     ------
     InputError
-        When a directory has the name of a file, or a link, or anything else, that of a directory.
+        When a directory, a link, a pipe or a device has the name of a file, or anything but a directory that of a directory.
     """
     for name in names:
-        path = folder / name
-        if path.is_dir() and not path.is_symlink():
-            raise InputError("--out", str(folder), f"{name} in it is a folder, where a file is to be written; remove it, or choose another")
+        if what := strange(folder / name):
+            raise InputError("--out", str(folder), f"{name} in it is {what}, where a file is to be written; remove it, or choose another")
     for name in folders:
         refuse_no_folder(folder / name, "--out")
+
+
+def strange(path: Path) -> str:
+    """What has the name of a file and is none, such as "a link"; empty for a regular file, and where there is nothing."""
+    try:
+        mode = path.lstat().st_mode
+    except OSError:
+        return ""
+    return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no regular file")
 
 
 def refuse_no_folder(path: Path, key: str = "path") -> None:

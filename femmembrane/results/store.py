@@ -128,21 +128,28 @@ def replace_file(path: str | PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     InputError
-        When the folder does not exist or cannot be written to.
+        When the folder does not exist or cannot be written to, or when a link, a pipe, a device or a folder has the name: none is replaced.
     """
     path = Path(path)
     if not path.name or "\0" in str(path):
         raise InputError("path", str(path), "the name of a file in an existing, writable folder is needed")
+    _refuse_strange(path)
     temporary = files.temporary_name(path)
     try:
         with files.claimed(temporary):
             yield temporary
+            _refuse_strange(path)  # it may have come in between
             replace(temporary, path)
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
         raise InputError("path", str(path), f"a file in an existing, writable folder is needed ({error.strerror})") from error
     finally:
         if temporary.parent.is_dir():
             temporary.unlink(missing_ok=True)
+
+
+def _refuse_strange(path: Path) -> None:
+    if what := files.strange(path):
+        raise InputError("path", str(path), f"it is {what}, which no file replaces; another name is allowed")
 
 
 def to_xarray(branch: Branch) -> xarray.Dataset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +15,46 @@ _TWO = ("B21", "B31", "B23", "B33", "T2D2", "T3D2", "SAX1", "MAX1", "MGAX1", "R2
 _THREE = ("B22", "B32", "T2D3", "T3D3", "SAX2", "MAX2", "MGAX2")
 
 
+#: what makes or moves nodes and elements without listing them
+_MAKERS = ("*NGEN", "*NFILL", "*NCOPY", "*NMAP", "*ELGEN", "*ELCOPY", "*SYSTEM")
 #: numbers of elements from, to, by steps of
 _Range = tuple[int, int, int]
 
 
+@dataclass
+class _Part:
+    """What stands between *PART and *END PART, where numbers of nodes and elements start anew; or outside of all parts."""
+
+    nodes: list[list[str]] = field(default_factory=list)
+    blocks: list[tuple[str, str, list[list[str]]]] = field(default_factory=list)
+    sets: list[tuple[str, bool, list[list[str]]]] = field(default_factory=list)
+
+
 def read(path: Path) -> Lines:
     """The lines of a .inp file."""
-    nodes: list[list[str]] = []
-    blocks: list[tuple[str, str, list[list[str]]]] = []
-    sets: list[tuple[str, bool, list[list[str]]]] = []
-    body: list[list[str]] = []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    lines = Lines(np.zeros((0, 3)))
+    points, first = [lines.points], 0
+    parts = _split(path.read_text(encoding="utf-8-sig", errors="replace"))
+    if not any(part.nodes for part in parts):
+        raise UnreadableError("its nodes (*NODE) are missing")
+    for part in parts:
+        own = _lines(part)
+        points.append(own.points)
+        lines.others |= own.others
+        for blocks in own.cells.values():
+            for cells, groups in blocks:
+                lines.add(cells + first, groups)
+        first += len(own.points)
+    lines.points = np.concatenate(points)
+    return lines
+
+
+def _split(text: str) -> list[_Part]:
+    """The parts of a file; the first one is what stands outside of them."""
+    parts = {"": _Part()}
+    of_instance: dict[str, str] = {}
+    here, body, moved = parts[""], list[list[str]](), list[list[str]]()
+    for line in text.splitlines():
         words = [word.strip() for word in line.split(",")]
         if line.startswith("**") or not line.strip():
             continue
@@ -32,24 +62,49 @@ def read(path: Path) -> Lines:
             body.append([word for word in words if word])
             continue
         name, options = words[0].upper(), {key.strip().upper(): value.strip() for key, _, value in (w.partition("=") for w in words[1:])}
-        if name == "*INCLUDE":
+        if name == "*INCLUDE" or (name in ("*NODE", "*ELEMENT", "*ELSET") and "INPUT" in options):
             raise UnreadableError("it includes another file; one file is read, which holds all")
-        body = nodes if name == "*NODE" else []
-        if name == "*ELEMENT":
-            blocks.append((options.get("TYPE", "").upper(), options.get("ELSET", ""), body))
+        if name in _MAKERS or (name == "*NODE" and options.get("SYSTEM", "R").upper() != "R"):
+            raise UnreadableError(f"it makes or moves nodes or elements ({words[0][:40]}); a file that lists all, in place, is read")
+        body = []
+        if name == "*PART":
+            here = parts.setdefault(options.get("NAME", "").upper(), _Part())
+        elif name == "*END PART":
+            here = parts[""]
+        elif name == "*INSTANCE":
+            part = options.get("PART", "").upper()
+            if part in of_instance.values():
+                raise UnreadableError("a part has two instances; one of each is read")
+            of_instance[options.get("NAME", "").upper()] = part
+            body = moved
+        elif name == "*NODE":
+            body = here.nodes
+        elif name == "*ELEMENT":
+            here.blocks.append((options.get("TYPE", "").upper(), options.get("ELSET", ""), body))
         elif name == "*ELSET":
-            sets.append((options.get("ELSET", ""), "GENERATE" in options, body))
-    if not nodes:
-        raise UnreadableError("its nodes (*NODE) are missing")
-    rows = numbers([(row + ["0"] * 4)[:4] for row in nodes], "nodes")
+            owner = (
+                parts.get(of_instance[options["INSTANCE"].upper()], here) if options.get("INSTANCE", "").upper() in of_instance else here
+            )
+            owner.sets.append((options.get("ELSET", ""), "GENERATE" in options, body))
+    if moved:
+        raise UnreadableError("an instance of a part is moved, or has nodes of its own; a part that is drawn in its place is read")
+    return list(parts.values())
+
+
+def _lines(part: _Part) -> Lines:
+    if not part.nodes:
+        if any(body for _, _, body in part.blocks):
+            raise UnreadableError("the nodes (*NODE) of its elements are missing")
+        return Lines(np.zeros((0, 3)))
+    rows = numbers([(row + ["0"] * 4)[:4] for row in part.nodes], "nodes")
     lines = Lines(rows[:, 1:])
-    tables, members = _elements(lines, blocks)
-    for name, generate, body in sets:
+    tables, members = _elements(lines, part.blocks)
+    for name, generate, body in part.sets:
         _add_members(members.setdefault(name, []), members, generate, body)
     tags = whole(rows[:, 0], "numbers of nodes")
-    for size, parts in tables.items():
-        if parts:
-            _add(lines, tags, np.concatenate(parts), members, size)
+    for size, found in tables.items():
+        if found:
+            _add(lines, tags, np.concatenate(found), members, size)
     return lines
 
 
@@ -62,12 +117,24 @@ def _elements(
     for kind, name, body in blocks:
         size = 2 if kind.startswith(_TWO) else 3 if kind.startswith(_THREE) else 0
         if size and body:
+            body = _whole_rows(body, 1 + size)
             tables[size].append(whole(numbers([row[: 1 + size] for row in body], "elements"), "elements").reshape(-1, 1 + size))
             if name:
                 members.setdefault(name, []).extend((n, n, 1) for n in tables[size][-1][:, 0].tolist())
         elif body:
             lines.others.add(kind[:40] or "elements without a type")
     return tables, members
+
+
+def _whole_rows(body: list[list[str]], width: int) -> list[list[str]]:
+    """Rows that go on in the next line where they are too short, made one."""
+    rows: list[list[str]] = []
+    for row in body:
+        if rows and len(rows[-1]) < width:
+            rows[-1] = rows[-1] + row
+        else:
+            rows.append(row)
+    return rows
 
 
 def _add_members(own: list[_Range], members: dict[str, list[_Range]], generate: bool, body: list[list[str]]) -> None:

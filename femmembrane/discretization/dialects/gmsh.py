@@ -57,6 +57,7 @@ class _Reader:
     def lines(self) -> Lines:
         known = {
             "Entities": self._read_entities,
+            **({"PartitionedEntities": self._read_parts} if self.version == (4, 1) else {}),
             "Nodes": self._read_nodes,
             "Elements": self._read_elements,
         }
@@ -100,10 +101,22 @@ class _Reader:
                 self.names[abs(int(tag))] = label.decode("utf-8", "replace")
 
     def _read_entities(self) -> None:
+        self._read_geometry(parts=False)
+
+    def _read_parts(self) -> None:
+        """What a mesh was divided into for several processors: entities with a parent, of the groups of this one."""
+        self._values(self.size, 1)
+        self._values("i4", 2 * count(self._values(self.size, 1)[0], "ghosts"))
+        self._read_geometry(parts=True)
+
+    def _read_geometry(self, parts: bool) -> None:
         counts = [count(n, "entities") for n in self._values(self.size, 4)]
         for dimension, many in enumerate(counts):
             for _ in range(many):
                 (tag,) = self._values("i4", 1)
+                if parts:
+                    self._values("i4", 2)
+                    self._values("i4", count(self._values(self.size, 1)[0], "parts of a mesh"))
                 self._values("f8", 3 if dimension == 0 and self.version == (4, 1) else 6)
                 groups = self._values("i4", count(self._values(self.size, 1)[0], "groups of an entity"))
                 if dimension == 1:

@@ -101,8 +101,23 @@ class _Reader:
         width, length = count(self._word(), "numbers"), count(self._word(), "numbers")
         kind = self._word()
         if kind == "string":
-            raise UnreadableError("it has a field of texts")
+            for _ in range(count(width * length, "texts")):
+                self._skip_text()
+            return
         self._array(count(width * length, "numbers"), kind)
+
+    def _skip_text(self) -> None:
+        """Pass over a text: a line; in binary files its length goes before it, in 1, 2, 4 or 8 bytes by the first two bits."""
+        if not self.binary:
+            end = self.data.find(b"\n", self.place)
+            self.place = len(self.data) if end < 0 else end + 1
+            return
+        head = self.data[self.place : self.place + 1]
+        if not head:
+            raise UnreadableError("it ends before the texts that it declares")
+        width = (8, 4, 2, 1)[head[0] >> 6]
+        length = int.from_bytes(self.data[self.place : self.place + width], "big") & ((1 << (8 * width - 2)) - 1)
+        self.place = min(self.place + width + length, len(self.data))
 
     def _runs(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Points of cells, and where each cell ends."""

@@ -10,7 +10,7 @@ import lazy_loader
 
 __version__ = "0.1.0"
 
-_imported, __dir__, _names = lazy_loader.attach_stub(__name__, __file__)
+_imported, _, _names = lazy_loader.attach_stub(__name__, __file__)
 __all__ = ["__version__", *_names]
 
 
@@ -23,3 +23,7 @@ def __getattr__(name: str) -> Any:
         value = _imported(name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

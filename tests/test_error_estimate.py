@@ -171,6 +171,23 @@ def test_near_a_limit_point(limit_point, offset):
     assert estimate.volume.error / (eq.volume - exact.volume) == pytest.approx(1, abs=0.1)
 
 
+@pytest.mark.parametrize("offset", [-1e-3, 1e-3])
+def test_a_state_beyond_a_fold_is_not_compared(offset):
+    """V errs by 0.433 left of the least pressure and by -0.446 right of it: Newton finds the left one from both sides."""
+    scene = disc_scene(OGDEN, elements=8)
+    branch = fm.trace(scene, start=21.0, until={"volume": 24.0})
+    (point,) = (p.equilibrium for p in branch.special_points if p.kind == "limit_point")
+    eq = fm.equilibrium(scene, volume=point.volume + offset, start=point, solver="newton")
+    fine = fm.equilibrium(disc_scene(OGDEN, elements=12, degree=6), volume=22.172742 + np.sign(offset) * 0.4, solver="newton")
+    exact = fm.equilibrium(fine.scene, pressure=eq.pressure, start=fine, solver="newton")
+    assert eq.volume - exact.volume == pytest.approx({-1e-3: 0.4326, 1e-3: -0.4458}[offset], abs=1e-3)
+    estimate = eq.error_estimate("pressure")
+    if estimate.reason:  # none is better than one of the other side
+        assert np.isnan(estimate.volume.error)
+    else:
+        assert estimate.volume.error / (eq.volume - exact.volume) == pytest.approx(1, abs=0.1)
+
+
 def test_at_a_limit_point_there_is_no_volume_to_compare(limit_point):
     """Its pressure lies above the limit point of the continuum (1.899084863, data/disc.json): no equilibrium has it."""
     assert limit_point.pressure > 1.899084863

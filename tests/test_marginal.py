@@ -33,6 +33,16 @@ def test_just_beside_a_limit_point_the_sign_is_believed(limit_points):
         assert eq.verdict("pressure").stable is stable
 
 
+@pytest.mark.parametrize("step", [-2e-3, 2e-3])
+def test_the_error_of_a_small_eigenvalue_holds_that_of_the_mesh(limit_points, step):
+    """8.9e-3 and -8.9e-3, which the mesh resolves well: they are off by 1.6e-7, and their algebraic error is 2e-11."""
+    eq = fm.equilibrium(limit_points[0].scene, volume=limit_points[0].volume + step, solver="newton")
+    verdict = eq.verdict("pressure")
+    exact = fm.equilibrium(disc_scene(OGDEN, elements=16, degree=6), volume=eq.volume, solver="newton").verdict("pressure")
+    assert abs(exact.smallest_eigenvalue) == pytest.approx(8.86e-3, rel=1e-2)
+    assert 1e-8 < abs(verdict.smallest_eigenvalue - exact.smallest_eigenvalue) < verdict.error < 1e-5
+
+
 def test_flat_unloaded_disc_is_marginal():
     """Its transverse stiffness is zero: neither stable nor unstable, under any control."""
     eq = fm.equilibrium(disc_scene(OGDEN, elements=8), pressure=0.0)

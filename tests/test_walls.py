@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import ast
+import importlib
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -107,6 +110,19 @@ def test_public_names_are_imported_when_used():
     assert set(femmembrane.__all__) <= set(dir(femmembrane))
     for name in femmembrane.__all__:
         assert getattr(femmembrane, name) is not None
+
+
+def test_public_names_are_those_of_the_stub():
+    """Each is taken from the module that the stub names, where type checkers look for it; ``import femmembrane`` loads none of them."""
+    stub = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
+    homes = {alias.asname: node.module for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert sorted(femmembrane.__all__) == sorted(["__version__", *homes])
+    for name, home in homes.items():
+        assert getattr(femmembrane, name) is getattr(importlib.import_module(f"femmembrane.{home}"), name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = femmembrane.nothing
+    loaded = [sys.executable, "-c", "import femmembrane, sys; print(*(name for name in sys.modules if name.startswith('femmembrane.')))"]
+    assert subprocess.run(loaded, capture_output=True, check=True, text=True).stdout.split() == []
 
 
 @pytest.mark.parametrize("path", FILES, ids=name_of)

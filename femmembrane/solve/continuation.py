@@ -19,6 +19,8 @@ from .controls import CONTROLS, ArcLengthControl, Controlled
 from .newton import TOLERANCE, correct
 from .state import Predictor, State, inner
 
+#: steps so many times the smallest that turn on the spot in a tension field have met a corner
+CORNER = 100.0
 #: smallest step relative to the arc length so far
 ROUND_OFF = 1e-14
 #: times the error of a point that a prediction from the points before may miss
@@ -133,9 +135,11 @@ def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[
         return None, result.iterations, 0.5
     cosine = float(point.dual @ new.tangent + point.dual_pressure * new.tangent_pressure)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
-    if angle > 2 * control.turn or miss > 50 * control.deviation:
-        return None, result.iterations, 0.5
     chord = math.sqrt(_square(potential, state.x - point.state.x, state.pressure - point.state.pressure))
+    # where the border of a wrinkled zone passes a point the branch has a corner, which no shorter step makes round
+    corner = potential.scene.tension_field and step <= CORNER * control.smallest and chord <= 2 * step and cosine > 0
+    if not corner and (angle > 2 * control.turn or miss > 50 * control.deviation):
+        return None, result.iterations, 0.5
     half = angle / 2
     new.sigma = point.sigma + chord * (half / math.sin(half) if half else 1.0)  # of the circle through both points with these tangents
     quality = min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))

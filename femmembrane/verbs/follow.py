@@ -286,11 +286,11 @@ def _follow(
         found.append(new)
         if on_step is not None:
             on_step(index, len(loads), new)
-        if new.status is Status.SLACK and index + 1 < len(loads):
-            status, message = (
-                Status.SLACK,
-                f"{CONTROLS[control].words} {loads[index + 1]:.9g} was not reached: {slackness(potential, state)}",
-            )
+        more = index + 1 < len(loads)
+        if new.status is Status.SLACK and (more or not throw):  # with nothing after it, it is what was asked for
+            status, message = Status.SLACK, str(slackness(potential, state))
+            if more:
+                message = f"{CONTROLS[control].words} {loads[index + 1]:.9g} was not reached: {message}"
             break
         if on_checkpoint is not None:
             memory = remembered(walk.path, potential.space.n_free)

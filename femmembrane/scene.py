@@ -506,7 +506,7 @@ class Scene:
         """
         import tomli_w
 
-        from .results.store import replace_file
+        from .files import replace_file
 
         text = tomli_w.dumps(self.to_dict())
         with replace_file(path) as temporary:
@@ -524,7 +524,7 @@ def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
     InputError
         When the file cannot be read or is no TOML (with the line).
     """
-    from .results.files import read_bytes
+    from .files import read_bytes
 
     path = Path(path)
     try:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femmembrane import files
 from femmembrane.discretization.meridian import disc
 from femmembrane.errors import InputError, Status
 from femmembrane.native import native
@@ -254,7 +255,7 @@ def test_a_failed_writer_leaves_the_old_file(tmp_path: Path) -> None:
     path.write_text("old")
 
     def write() -> None:
-        with store.replace_file(path) as temporary:
+        with files.replace_file(path) as temporary:
             temporary.write_text("ne")
             raise RuntimeError("midway")
 
@@ -267,7 +268,7 @@ def test_a_failed_writer_leaves_the_old_file(tmp_path: Path) -> None:
 def test_replaced_in_one_step(tmp_path: Path) -> None:
     path = tmp_path / "result.txt"
     path.write_text("old")
-    with store.replace_file(path) as temporary:
+    with files.replace_file(path) as temporary:
         temporary.write_text("new")
         assert path.read_text() == "old"
         assert temporary.parent == path.parent
@@ -285,7 +286,7 @@ def test_every_writer_is_atomic(judged: Branch, tmp_path: Path, monkeypatch: pyt
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(store, "replace", fail)
+        patch.setattr("os.replace", fail)
         for writer, name in ((table.write_csv, "branch.csv"), (store.save, "branch.nc")):
             with pytest.raises(OSError, match="No space"):
                 writer(judged, tmp_path / name)

@@ -15,6 +15,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 #: each room may import those before it; what is left of the dot names a folder or a module
 ROOMS = (
     ("errors", "memory", "threads", "native"),
+    ("files", "lock", "origin"),
     ("physics",),
     ("discretization",),
     ("scene",),

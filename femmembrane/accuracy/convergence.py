@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..discretization.space import Space
 from ..errors import unknown_name
+from ..files import write_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -163,14 +164,7 @@ class Convergence:
         InputError
             When the file cannot be written.
         """
-        import csv
-
-        from ..results.store import replace_file
-
-        with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows(self.rows())
+        write_csv(path, COLUMNS, self.rows())
 
     def plot(
         self, path: str | PathLike[str] | None = None, *, quantities: Sequence[str] | None = None, against: str = "unknowns"

@@ -15,14 +15,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, NotWrittenError, Status
+from ..files import read_bytes, refuse_obstacles, replace_file
 from ..native import native
-from .files import RECORD, RUN_FILES, SURFACES_FOLDER, read_bytes, refuse_obstacles
-from .origin import NOTED_VERSIONS
-from .store import package_version, reason, replace_file, save
+from ..origin import NOTED_VERSIONS, package_version
+from .store import reason, save
 from .table import write_csv, write_special_points_csv, write_zones_csv
 
 if TYPE_CHECKING:
     from .records import Branch
+
+#: the record of a run, which makes its folder complete, and all files of one, in the order in which they are listed
+RECORD = "run.json"
+RUN_FILES = (
+    *("branch.csv", "special_points.csv", "zones.csv", RECORD),
+    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
+    "report.html",  # written from the rest, by whom it is asked for
+)
+#: the folder of the surfaces of a run
+SURFACES_FOLDER = "membrane"
 
 
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:

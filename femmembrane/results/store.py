@@ -1,4 +1,4 @@
-"""Branches on disk: NetCDF files that hold a computation whole, and the one way in which the package writes files.
+"""Branches on disk: NetCDF files that hold a computation whole.
 
 A file is one data set with the dimensions ``step`` (equilibria), ``node`` (points along the meridian), ``coefficient`` (the state) and,
 when the branch was searched for them, ``special_point`` and ``zone``. The state is kept to the last bit, so that a loaded equilibrium is
@@ -14,19 +14,17 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import partial
-from importlib import metadata
-from os import PathLike, replace
-from pathlib import Path
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import files
 from ..discretization.meridian import side
 from ..errors import InputError, Status
-from . import files
+from ..origin import package_version
 
 if TYPE_CHECKING:
     import xarray
@@ -118,33 +116,6 @@ _PATIENCE = 60.0
 _UNFOLDED = 1100
 
 
-@contextmanager
-def replace_file(path: str | PathLike[str]) -> Iterator[Path]:
-    """Write a file whole or not at all.
-
-    Yields the name of a temporary file in the same folder, with the same suffix. When the block ends well it takes the place of ``path``
-    in one step; when the block raises, ``path`` stays as it was and the temporary file is gone.
-
-    Raises
-    ------
-    InputError
-        When the folder does not exist or cannot be written to.
-    """
-    path = Path(path)
-    if not path.name or "\0" in str(path):
-        raise InputError("path", str(path), "the name of a file in an existing, writable folder is needed")
-    temporary = files.temporary_name(path)
-    try:
-        with files.claimed(temporary):
-            yield temporary
-            replace(temporary, path)
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
-        raise InputError("path", str(path), f"a file in an existing, writable folder is needed ({error.strerror})") from error
-    finally:
-        if temporary.parent.is_dir():
-            temporary.unlink(missing_ok=True)
-
-
 def to_xarray(branch: Branch) -> xarray.Dataset:
     """The branch as one data set: the columns of the table, the profiles at the nodes, the states and the special points.
 
@@ -193,7 +164,7 @@ def write_dataset(dataset: xarray.Dataset, path: str | PathLike[str], encoding: 
     marked = dataset.assign_attrs(seal=f"{files.SEAL} its digest is the last line of the file, and of all before that line")
     marked.to_netcdf(image, engine="h5netcdf", encoding=encoding)
     content = files.sealed(image.getvalue())
-    with replace_file(path) as temporary:
+    with files.replace_file(path) as temporary:
         temporary.write_bytes(content)
 
 
@@ -239,14 +210,6 @@ def scene_from_text(text: str) -> Scene:
     from ..scene import Scene
 
     return Scene.from_dict(tomllib.loads(text))
-
-
-def package_version(name: str = "femmembrane") -> str:
-    """Version of an installed distribution, or ``unknown`` (a source tree that was never installed)."""
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return "unknown"
 
 
 def _table_variables(branch: Branch) -> dict[str, _Variable]:

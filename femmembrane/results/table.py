@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from .. import files
 from ..stability.zones import KINDS
-from .store import replace_file
 
 if TYPE_CHECKING:
     import pandas
@@ -88,8 +86,8 @@ def rows(branch: Branch) -> Iterator[list[float | int | str]]:
 
 
 def write_csv(branch: Branch, path: str | PathLike[str]) -> None:
-    """Write :func:`rows` under a header line; numbers keep their full double precision."""
-    _write(path, columns(branch), rows(branch))
+    """Write :func:`rows` under a header line, with :func:`femmembrane.files.write_csv`."""
+    files.write_csv(path, columns(branch), rows(branch))
 
 
 def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
@@ -105,7 +103,7 @@ def special_point_columns(branch: Branch) -> list[str]:
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the special points; no rows means that the branch was searched and has none."""
-    _write(path, special_point_columns(branch), special_point_rows(branch))
+    files.write_csv(path, special_point_columns(branch), special_point_rows(branch))
 
 
 def zone_rows(branch: Branch) -> Iterator[list[Any]]:
@@ -117,7 +115,7 @@ def zone_rows(branch: Branch) -> Iterator[list[Any]]:
 
 def write_zones_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the zones by the criterion of the scene."""
-    _write(path, list(ZONE_COLUMNS), zone_rows(branch))
+    files.write_csv(path, list(ZONE_COLUMNS), zone_rows(branch))
 
 
 def to_dataframe(branch: Branch) -> pandas.DataFrame:
@@ -125,12 +123,3 @@ def to_dataframe(branch: Branch) -> pandas.DataFrame:
     import pandas
 
     return pandas.DataFrame(list(rows(branch)), columns=columns(branch))
-
-
-def _write(path: str | PathLike[str], header: list[str], body: Iterator[list[Any]]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")  # writes floats by repr, so that they read back to the last bit
-    writer.writerow(header)
-    writer.writerows(body)
-    with replace_file(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import platform
 import tempfile
@@ -16,15 +15,16 @@ from typing import Any
 
 import numpy as np
 
+from .. import files
 from ..accuracy import cost as work
 from ..accuracy.cost import Course, Job, Measurement, Outcome, Reference
 from ..accuracy.strong_form import StrongForm, prescribed
 from ..errors import InputError, SolveError, unknown_name
 from ..native import native
+from ..origin import NOTED_VERSIONS, package_version, processor
 from ..potential import Potential, potential_of
-from ..results.origin import NOTED_VERSIONS, processor
 from ..results.records import Branch, Equilibrium
-from ..results.store import package_version, replace_file, save
+from ..results.store import save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene
 from ..solve.banded import BandFactor, BorderedFactor
@@ -122,10 +122,7 @@ class Cost:
         InputError
             When the folder does not exist or cannot be written to.
         """
-        with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows([["" if _absent(value) else value for value in row] for row in self._rows()])
+        files.write_csv(path, COLUMNS, ([None if _absent(value) else value for value in row] for row in self._rows()))
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Error against milliseconds as a Matplotlib figure, also written to ``path`` if given."""

@@ -118,7 +118,7 @@ class FoldCurve:
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Pressure and volume of the fold against the number as a Matplotlib figure, also written to ``path`` if given."""
-        from ..results.store import replace_file
+        from ..files import replace_file
         from ..views.backend import drawing, load, title_text
 
         load()

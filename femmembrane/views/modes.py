@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..results.store import replace_file
+from ..files import replace_file
 from ..stability.verdict import Verdict
 from ..threads import cached_property
 from .picture import aim, circles, new_plotter, polydata

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
-from ..results.store import MEANING, replace_file
+from ..files import replace_file
+from ..results.store import MEANING
 from ..stability.zones import KINDS
 from .backend import load
 from .stage import Box, surroundings

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..results.store import replace_file
+from ..files import replace_file
 from .backend import drawing, load, title_text
 from .stage import Box, clamped_ends, surroundings
 from .vtk import smooth_profile

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.accuracy.error_estimate import QUANTITIES
+from femmembrane.results.error_estimate import QUANTITIES
 from femmembrane.stability import verdict
 
 from .cases import LIMIT_POINTS, OGDEN, POINTS, disc_scene

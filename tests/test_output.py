@@ -19,8 +19,8 @@ from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
 from femmembrane.results import output, store, table
 from femmembrane.results.records import Branch, SpecialPoint
+from femmembrane.results.verdict import Verdict
 from femmembrane.scene import Analysis, Scene
-from femmembrane.stability.verdict import Verdict
 from femmembrane.verbs import inflate
 
 VOLUMES = [1.0, 2.0, 4.0]

@@ -14,15 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status, printable, unknown_name
 from ..threads import one_thread
+from . import door
+from .zones import KINDS
 
 if TYPE_CHECKING:
-    from ..accuracy.error_estimate import ErrorEstimate
     from ..potential import Potential
     from ..scene import Scene
     from ..solve.controls import Gas
-    from ..stability.frequencies import Vibration
-    from ..stability.verdict import Verdict
-    from ..stability.zones import Zones
+    from .error_estimate import ErrorEstimate
+    from .verdict import Verdict
+    from .vibration import Vibration
+    from .zones import Zones, ZonesAlong
 
 Array = NDArray[np.float64]
 
@@ -114,11 +116,9 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        from ..stability.profile import profile_at
-
         space = self.potential.space
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
-        return profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
@@ -152,11 +152,9 @@ class Equilibrium:
 
     @one_thread
     def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
-        from ..stability.judge import judge
-
         evaluation = self.potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
-        return judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+        return door.judge(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:
@@ -178,9 +176,7 @@ class Equilibrium:
         SolveError
             Where a compressive stress leaves the spectrum without a lowest eigenvalue.
         """
-        from ..stability.frequencies import natural_frequencies
-
-        return natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
+        return door.natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
 
     def zones(self, criterion: str | None = None) -> Zones:
         """Taut and wrinkled zones by the signs of the principal stresses, from the pole to the rim; computed once and remembered.
@@ -197,11 +193,9 @@ class Equilibrium:
         InputError
             For an unknown criterion.
         """
-        from ..stability import zones
-
         criterion = (self.scene.analysis.wrinkling or "total") if criterion is None else criterion
         if not isinstance(criterion, str) or criterion not in self._zones:
-            self._zones[criterion] = zones.find_zones(self.scene, self.state, self.pressure, criterion)
+            self._zones[criterion] = door.find_zones(self.scene, self.state, self.pressure, criterion)
         return self._zones[criterion]
 
     @one_thread
@@ -221,18 +215,14 @@ class Equilibrium:
         InputError
             For an unknown control.
         """
-        from ..accuracy.error_estimate import estimate_errors
-
         if not isinstance(control, str) or control not in self._errors:
             verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
-            self._errors[control] = estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
+            self._errors[control] = door.estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
         return self._errors[control]
 
     def _repr_html_(self) -> str:
         """Numbers and verdicts with the deformed meridian, for notebooks."""
-        from ..views.notebook import equilibrium_html
-
-        return equilibrium_html(self)
+        return door.equilibrium_html(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,7 +393,6 @@ class Branch(Sequence[Equilibrium]):
         InputError
             For an unknown name.
         """
-        from ..stability.zones import KINDS
         from .table import estimated
 
         if name == "step":
@@ -458,6 +447,10 @@ class Branch(Sequence[Equilibrium]):
         repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
         return self.remarks if self.scene.open else (*self.remarks, *repaired, *space_of_scene(self.scene).notes)
 
+    def zones_along(self) -> ZonesAlong:
+        """Zones of all equilibria and, where their kinds change from one to the next, of states between them."""
+        return door.zones_along(self)
+
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""
         from .table import to_dataframe
@@ -478,21 +471,15 @@ class Branch(Sequence[Equilibrium]):
 
     def to_vtk(self, path: str | PathLike[str]) -> None:
         """Write a ParaView collection (.pvd) with one VTU file a step."""
-        from ..views.vtk import write_vtk
-
-        write_vtk(self, path)
+        door.write_vtk(self, path)
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Pressure against volume as a Matplotlib figure, also written to ``path`` if given."""
-        from ..views.plots import plot_pressure_volume
-
-        return plot_pressure_volume(self, path)
+        return door.plot_pressure_volume(self, path)
 
     def report(self, path: str | PathLike[str]) -> None:
         """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings."""
-        from ..views.report import write_report
-
-        write_report(self, path)
+        door.write_report(self, path)
 
     def cite(self) -> str:
         """BibTeX of what the computation used."""
@@ -502,9 +489,7 @@ class Branch(Sequence[Equilibrium]):
 
     def _repr_html_(self) -> str:
         """The table and the pressure-volume diagram, for notebooks."""
-        from ..views.notebook import branch_html
-
-        return branch_html(self)
+        return door.branch_html(self)
 
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:

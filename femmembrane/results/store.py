@@ -25,13 +25,13 @@ from .. import files
 from ..discretization.meridian import side
 from ..errors import InputError, Status
 from ..origin import package_version
+from .error_estimate import QUANTITIES, ErrorEstimate, from_numbers
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..accuracy.error_estimate import ErrorEstimate
     from ..scene import Scene
-    from ..stability.verdict import Verdict
     from .records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 
 FORMAT = 1
@@ -285,7 +285,6 @@ def _zone_variables(branch: Branch) -> dict[str, _Variable]:
 
 def _estimate_variables(branch: Branch) -> dict[str, _Variable]:
     """All of the error estimates, which :func:`_estimates` needs to build them again."""
-    from ..accuracy.error_estimate import QUANTITIES
     from .table import estimated
 
     found = [eq.error_estimate(estimated(branch.scene)[0]) for eq in branch]
@@ -576,7 +575,6 @@ def _unknowns(scene: Scene) -> int:
 
 
 def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal: int) -> Iterator[Verdict]:
-    from ..stability.verdict import Verdict
 
     parts = {str(name).removeprefix(f"mode_{tag}_"): v.values for name, v in dataset.items() if str(name).startswith(f"mode_{tag}_")}
     for k in range(dataset.sizes["step"]):
@@ -598,7 +596,6 @@ def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal:
 
 
 def _estimates(dataset: xarray.Dataset) -> Iterator[ErrorEstimate]:
-    from ..accuracy.error_estimate import from_numbers
 
     if "error_estimate" not in dataset:
         return

@@ -7,7 +7,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from .. import files
-from ..stability.zones import KINDS
+from .zones import KINDS
 
 if TYPE_CHECKING:
     import pandas

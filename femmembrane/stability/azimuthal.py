@@ -42,13 +42,14 @@ from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, over_projection
 from ..physics.tension_field import natural_strains
 from ..potential import Array, Evaluation, Potential
+from ..results.verdict import Verdict
 from ..solve.banded import band_product
 from ..solve.wellposed import compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
 from .floating import pencil_of, rigid_part
 from .resolution import small_eigenvalue, unresolved
 from .spectrum import Pencil, SmallestEigenvalue, SpectrumError, smallest_of
-from .verdict import Verdict, against, verdict_from
+from .verdict import against, verdict_from
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
 #: accurate to about 1e-12 there (round-off/d for the quotient, (5 d/2)^4/270 for two Gauss points and the exponent 5)

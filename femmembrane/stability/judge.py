@@ -10,12 +10,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
+from ..results.verdict import Verdict
 from ..scene import MAX_WAVES
 from ..solve.finer import counterpart, transferred
 from .azimuthal import azimuthal_verdict, mode_in
 from .resolution import small_eigenvalue
 from .spectrum import SpectrumError
-from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
+from .verdict import CONTROLS, against, axisymmetric_verdict, in_words
 
 #: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once
 _CLEAR = 2.0

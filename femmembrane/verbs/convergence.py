@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, HEADINGS, PROFILES, ROUND_OFF, Convergence, profile_norms
+from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, profile_norms
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, potential_of
+from ..results.convergence import HEADINGS, PROFILES, ROUND_OFF, Convergence
 from ..results.records import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CenterHeightControl, Control, PressureControl, VolumeControl

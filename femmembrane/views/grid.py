@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..verbs.sweep import Sweep
+    from ..results.sweep import Sweep
 
 Array = NDArray[Any]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import replace_file
-from ..stability.verdict import Verdict
+from ..results.verdict import Verdict
 from ..threads import cached_property
 from .picture import aim, circles, new_plotter, polydata
 from .stage import Box
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pyvista
 
     from ..results.records import Equilibrium
-    from ..stability.frequencies import Vibration
+    from ..results.vibration import Vibration
 
 #: largest displacement that is shown unless an amplitude is given, relative to half the size of the membrane
 SHOWN = 0.15

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, unknown_name
 from ..files import replace_file
 from ..results.store import MEANING
-from ..stability.zones import KINDS
+from ..results.zones import KINDS
 from .backend import load
 from .stage import Box, surroundings
 from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
@@ -88,7 +88,7 @@ class Surface:
         The drawn meridian.
     revolution : Revolution
     values : ndarray
-        Of a quantity at the nodes; of "zone" between them: places in :data:`~femmembrane.stability.zones.KINDS`.
+        Of a quantity at the nodes; of "zone" between them: places in :data:`~femmembrane.results.zones.KINDS`.
     """
 
     equilibrium: Equilibrium

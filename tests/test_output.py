@@ -15,6 +15,7 @@ from femmembrane import files
 from femmembrane.discretization.meridian import disc
 from femmembrane.errors import InputError, Status
 from femmembrane.native import native
+from femmembrane.physics.loads import Weight
 from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
 from femmembrane.results import output, store, table
@@ -352,3 +353,13 @@ def test_unwritable_folder(plain: Branch, tmp_path: Path) -> None:
 def test_read_only_folder(plain: Branch) -> None:
     with pytest.raises(InputError, match="--out"):
         output.write_run(plain, "/proc")
+
+
+def test_every_column_of_the_table_can_be_asked_for():
+    scene = PLAIN.replace(loads=[Weight(0.01)], analysis=BOTH)
+    branch = inflate(scene, volumes=[0.5, 1.0])
+    names = table.columns(branch)
+    assert "load_energy" in names
+    for name, column in zip(names, zip(*table.rows(branch), strict=True), strict=True):
+        assert branch.column(name).tolist() == list(column)
+    assert branch.column("status").tolist() == [Status.CONVERGED.value] * 2

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import unknown_name
 from ..files import write_csv
 from . import door
+from .quantities import heading
 
 if TYPE_CHECKING:
     import pandas
@@ -33,9 +34,7 @@ ROUND_OFF = 16 * np.finfo(float).eps
 
 #: what is compared, and its heading in the table
 HEADINGS: Mapping[str, str] = {
-    "pressure": "P",
-    "volume": "V",
-    "center_height": "pole height",
+    **{name: heading(name) for name in ("pressure", "volume", "center_height")},
     "elastic_energy": "E elastic",
     "magnetic_energy": "E magnetic",
     "energy": "E total",

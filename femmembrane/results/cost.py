@@ -12,6 +12,7 @@ import numpy as np
 from .. import files
 from ..errors import unknown_name
 from . import door
+from .quantities import heading
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -102,9 +103,6 @@ _TITLES = {
 }
 
 
-_SYMBOLS = {"volume": "V", "pressure": "P", "center_height": "pole height"}
-
-
 @dataclass(frozen=True, eq=False)
 class Cost:
     """What :func:`cost` measured.
@@ -188,9 +186,9 @@ def _number(value: Any, form: str, width: int) -> str:
 
 
 def _text(study: Cost) -> Iterator[str]:
-    letter = "V" if study.quantity == "volume" else "P"
+    letter = heading(study.quantity)
     reference = study.reference
-    at = f"{_SYMBOLS[study.control]} = {study.load:.9g}"
+    at = f"{heading(study.control)} = {study.load:.9g}"
     yield f"One equilibrium at {at}: relative error in {letter} and milliseconds (* nothing is better in both)"
     yield (
         f"reference: {letter} = {reference.value:.15g}, {reference.elements} elements of degree {reference.degree}, "

@@ -71,19 +71,19 @@ class ErrorEstimate:
 
     def __str__(self) -> str:
         lines = [f"at the same {self.control}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
-        for name in QUANTITIES:
+        for name in ESTIMATED:
             d: Deviation = getattr(self, name)
             lines.append(f"{name.replace('_', ' '):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
         return "\n".join(lines + ([self.reason] if self.reason else []))
 
 
 #: what an estimate is about, in its order
-QUANTITIES = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
+ESTIMATED = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
 
 
 def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
     """The record of values and errors by name."""
     scales = {name: abs(value) for name, value in values.items()}
     scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
-    parts = {name: Deviation(values[name], errors[name], scales[name]) for name in QUANTITIES}
+    parts = {name: Deviation(values[name], errors[name], scales[name]) for name in ESTIMATED}
     return ErrorEstimate(control, **parts, method=method, reason=reason)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -12,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
-from ..errors import InputError, Status, printable, unknown_name
+from ..errors import InputError, Status, printable
 from ..threads import one_thread
 from . import door
-from .zones import KINDS
 
 if TYPE_CHECKING:
     from ..potential import Potential
@@ -384,8 +382,8 @@ class Branch(Sequence[Equilibrium]):
         Parameters
         ----------
         name : str
-            step, an attribute of :class:`Equilibrium`, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind of
-            zones, when the scene has scales, pressure_pa, and when it asks for error estimates, error_ with what they are of (relative
+            step, any column of the table, status, an energy, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind
+            of zones, when the scene has scales, pressure_pa, and when it asks for error estimates, error_ with what they are of (relative
             errors at the load that its [run] prescribes, else at the volume).
 
         Raises
@@ -393,28 +391,9 @@ class Branch(Sequence[Equilibrium]):
         InputError
             For an unknown name.
         """
-        from .table import estimated
+        from .table import column
 
-        if name == "step":
-            return np.arange(len(self))
-        kind, _, what = name.partition("_")
-        if kind in ("lambda", "verdict") and (what in _SHOWN or re.fullmatch(r"n[1-9]\d*", what)):
-            verdicts = [eq.verdict(what) if what in _SHOWN else eq.verdict(azimuthal=int(what[1:])) for eq in self]
-            return np.array([v.smallest_eigenvalue if kind == "lambda" else v.word for v in verdicts])
-        if kind == "fraction" and what in KINDS:
-            return np.array([eq.zones().fraction(what) for eq in self], dtype=np.float64)
-        held, errors = estimated(self.scene)
-        if kind == "error" and what in errors:
-            return np.array([getattr(eq.error_estimate(held), what).relative for eq in self], dtype=np.float64)
-        scales = self.scene.scales
-        if name == "pressure_pa" and scales is not None:
-            return scales.to_si("pressure", self.column("pressure"))
-        known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
-        if name not in known:
-            more = [*(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN), *(f"fraction_{k}" for k in KINDS)]
-            more += [f"error_{e}" for e in errors]
-            raise unknown_name("column", name, ("step", *known, *more, *(["pressure_pa"] if scales else [])))
-        return np.array([getattr(eq, name) for eq in self])
+        return column(self, name)
 
     def __str__(self) -> str:
         classes = self.scene.analysis.stability or _SHOWN

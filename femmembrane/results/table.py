@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import NDArray
+
 from .. import files
+from ..errors import unknown_name
+from .quantities import typed
 from .zones import KINDS
 
 if TYPE_CHECKING:
@@ -61,11 +66,11 @@ def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume"
     if column == "step":
         return step
     kind, _, name = column.partition("_")
-    if kind == "verdict":
-        return equilibrium.verdict(name).word
-    if kind == "lambda":
+    if kind in ("verdict", "lambda"):
         verdict = equilibrium.verdict(azimuthal=int(name[1:])) if name[1:].isdigit() else equilibrium.verdict(name)
-        return float(verdict.smallest_eigenvalue)
+        return verdict.word if kind == "verdict" else float(verdict.smallest_eigenvalue)
+    if column == "status":
+        return equilibrium.status.value
     scales = equilibrium.scene.scales
     if column == "pressure_pa" and scales is not None:
         return scales.to_si("pressure", equilibrium.pressure)
@@ -76,6 +81,30 @@ def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume"
     if column == "iterations":
         return int(equilibrium.iterations)
     return float(getattr(equilibrium, column))
+
+
+def known_columns(branch: Branch) -> list[str]:
+    """What :meth:`Branch.column` may be asked for: :func:`columns`, and what costs a look at the equilibria only when it is asked for.
+
+    Verdicts against azimuthal perturbations of any number of waves are left out of the list.
+    """
+    more = [*("magnetic_energy", "load_energy", "status"), *(f"{k}_{c}" for k in ("lambda", "verdict") for c in CONTROLS)]
+    return list(dict.fromkeys([*columns(branch), *more, *(f"fraction_{kind}" for kind in KINDS)]))
+
+
+def column(branch: Branch, name: str) -> NDArray[Any]:
+    """One column, of the type of its quantity.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    known = known_columns(branch)
+    if name not in known and not (isinstance(name, str) and re.fullmatch(r"(lambda|verdict)_n[1-9]\d*", name)):
+        raise unknown_name("column", name, known)
+    held, _ = estimated(branch.scene)
+    return typed(name, (value(equilibrium, step, name, held) for step, equilibrium in enumerate(branch)))
 
 
 def rows(branch: Branch) -> Iterator[list[float | int | str]]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..files import replace_file
-from ..results.store import MEANING
+from ..results.quantities import QUANTITIES
 from ..results.zones import KINDS
 from .backend import load
 from .stage import Box, surroundings
@@ -217,8 +217,8 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
         title = f"wrinkles by {criterion} stress"
     else:
         table = pyvista.LookupTable(_MAP, scalar_range=limits)
-        meaning, unit = MEANING[surface.quantity]
-        title = meaning if unit == "1" else f"{meaning} in {unit}"
+        shown = QUANTITIES[surface.quantity]
+        title = shown.meaning if shown.unit == "1" else f"{shown.meaning} in {shown.unit}"
     mapper = pyvista.DataSetMapper()
     mapper.lookup_table, mapper.scalar_range = table, table.scalar_range
     plotter.add_scalar_bar(

@@ -15,7 +15,6 @@ Source of the scene and of "shooting as published": Saxena, Reddy & Pradhan, Int
 from __future__ import annotations
 
 import argparse
-import csv
 import gc
 import sys
 import time
@@ -26,8 +25,8 @@ from pathlib import Path
 import numpy as np
 
 import femmembrane as fm
+from femmembrane.files import write_csv
 from femmembrane.potential import Potential
-from femmembrane.results.store import replace_file
 from femmembrane.solve.controls import VolumeControl
 from femmembrane.solve.newton import correct
 from femmembrane.threads import one_thread
@@ -120,10 +119,7 @@ def show_growth(rows: Sequence[dict[str, float]]) -> None:
 
 
 def write(rows: Sequence[dict[str, float]], path: Path) -> None:
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, GROWTH)
-        writer.writeheader()
-        writer.writerows(rows)
+    write_csv(path, GROWTH, ([row[name] for name in GROWTH] for row in rows))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

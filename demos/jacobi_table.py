@@ -15,14 +15,13 @@ material its table 1. The eigenvalues asserted at the end are those of an indepe
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import femmembrane as fm
-from femmembrane.results.store import replace_file
+from femmembrane.files import write_csv
 
 OGDEN = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
 #: material, dipole (strength and height), pole heights in the order in which they are solved; | marks the limit points between them
@@ -113,10 +112,7 @@ def show(rows: Sequence[Row]) -> None:
 
 
 def write(rows: Sequence[Row], path: Path) -> None:
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, [*(f.name for f in fields(Row)), "printed_is"])
-        table.writeheader()
-        table.writerows({**asdict(row), "printed_is": row.printed_is} for row in rows)
+    write_csv(path, [*(f.name for f in fields(Row)), "printed_is"], ([*asdict(row).values(), row.printed_is] for row in rows))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

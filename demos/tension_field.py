@@ -25,7 +25,6 @@ and volumes asserted at the end are those of an independent solver (shooting fro
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ from typing import Any
 import numpy as np
 
 import femmembrane as fm
-from femmembrane.results.store import replace_file
+from femmembrane.files import write_csv
 from femmembrane.views import plots
 
 #: figure, strength and height of the dipole, heights of the pole
@@ -111,10 +110,7 @@ def show(rows: Sequence[Row]) -> None:
 
 
 def write(rows: Sequence[Row], path: Path) -> None:
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(COLUMNS)
-        table.writerows(row.cells() for row in rows)
+    write_csv(path, COLUMNS, (row.cells() for row in rows))
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:

@@ -17,7 +17,6 @@ those of an independent spectral Ritz solver; the height of the onset was record
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,7 +25,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import femmembrane as fm
-from femmembrane.results.store import replace_file
+from femmembrane.files import write_csv
 
 SCENE = fm.Scene(
     material=fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0)),
@@ -66,10 +65,7 @@ def show(rows: Sequence[dict[str, float]]) -> None:
 
 
 def write(rows: Sequence[dict[str, float]], path: Path) -> None:
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        columns = csv.DictWriter(file, list(rows[0]))
-        columns.writeheader()
-        columns.writerows(rows)
+    write_csv(path, list(rows[0]), (list(row.values()) for row in rows))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -19,7 +19,6 @@ Source of the scene: Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019
 from __future__ import annotations
 
 import argparse
-import csv
 import statistics
 import sys
 import time
@@ -29,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 import femmembrane as fm
-from femmembrane.results.store import replace_file
+from femmembrane.files import write_csv
 from femmembrane.stability.checked_verdict import checked_verdict
 
 SCENE = fm.Scene(
@@ -64,8 +63,7 @@ def verdicts(branch: fm.Branch, warm: bool) -> tuple[dict[str, float], dict[str,
 
 
 def write(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([("what", "warm_ms", "cold_ms"), *rows])
+    write_csv(path, ("what", "warm_ms", "cold_ms"), rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

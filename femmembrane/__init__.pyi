@@ -1,8 +1,5 @@
 """The public names: where each is defined. This list is the only one; ``__init__.py`` reads it."""
 
-from .accuracy.convergence import Convergence as Convergence
-from .accuracy.error_estimate import Deviation as Deviation
-from .accuracy.error_estimate import ErrorEstimate as ErrorEstimate
 from .discretization.meridian import Disc as Disc
 from .discretization.meridian import disc as disc
 from .discretization.mesh_files import Curve as Curve
@@ -45,23 +42,30 @@ from .physics.sources import Wire as Wire
 from .physics.tabulated import Tabulated as Tabulated
 from .potential import StrainEnergy as StrainEnergy
 from .results.citations import cite as cite
+from .results.convergence import Convergence as Convergence
+from .results.cost import Cost as Cost
+from .results.equilibria import Equilibria as Equilibria
+from .results.error_estimate import Deviation as Deviation
+from .results.error_estimate import ErrorEstimate as ErrorEstimate
+from .results.folds import Cusp as Cusp
+from .results.folds import FoldCurve as FoldCurve
 from .results.records import Branch as Branch
 from .results.records import Equilibrium as Equilibrium
 from .results.records import Jump as Jump
 from .results.records import SpecialPoint as SpecialPoint
 from .results.store import load as load
+from .results.sweep import Sweep as Sweep
+from .results.verdict import Verdict as Verdict
+from .results.vibration import Vibration as Vibration
+from .results.zones import Zone as Zone
+from .results.zones import Zones as Zones
 from .scene import Analysis as Analysis
 from .scene import Run as Run
 from .scene import Scene as Scene
 from .solve.continuation import StepControl as StepControl
 from .solve.controls import Gas as Gas
-from .stability.frequencies import Vibration as Vibration
 from .stability.jacobi import jacobi_test as jacobi_test
 from .stability.jacobi import legendre_test as legendre_test
-from .stability.verdict import Verdict as Verdict
-from .stability.zones import Zone as Zone
-from .stability.zones import Zones as Zones
-from .verbs import Equilibria as Equilibria
 from .verbs import equilibria as equilibria
 from .verbs import equilibrium as equilibrium
 from .verbs import fold_curve as fold_curve
@@ -70,11 +74,7 @@ from .verbs import pressurize as pressurize
 from .verbs import run as run
 from .verbs import trace_iter as trace_iter
 from .verbs.convergence import convergence as convergence
-from .verbs.cost import Cost as Cost
 from .verbs.cost import cost as cost
-from .verbs.folds import Cusp as Cusp
-from .verbs.folds import FoldCurve as FoldCurve
-from .verbs.sweep import Sweep as Sweep
 from .verbs.sweep import plan_sweep as plan_sweep
 from .verbs.sweep import sweep as sweep
 from .verbs.trace import trace as trace

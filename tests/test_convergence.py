@@ -12,7 +12,8 @@ import pytest
 
 import femmembrane as fm
 from femmembrane import cli
-from femmembrane.accuracy.convergence import COLUMNS, PROFILES, RESOLVED, observed_orders, profile_norms, richardson
+from femmembrane.accuracy.convergence import profile_norms
+from femmembrane.results.convergence import COLUMNS, PROFILES, RESOLVED, observed_orders, richardson
 
 from .cases import POINTS, SPECIAL_POINTS, disc_scene
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.accuracy.cost import Job, Measurement, Outcome, in_turns, measure, relative_error, with_front
+from femmembrane.accuracy.cost import Job, Outcome, in_turns, measure, relative_error, with_front
 from femmembrane.cli import main
-from femmembrane.verbs.cost import COLUMNS, asked_load
+from femmembrane.results.cost import COLUMNS, Measurement
+from femmembrane.verbs.cost import asked_load
 
 from .cases import POINTS, disc_scene
 

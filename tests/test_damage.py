@@ -19,9 +19,10 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane import files, origin
 from femmembrane.cli import main
 from femmembrane.errors import InputError
-from femmembrane.results import checkpoint, files, origin, output, store
+from femmembrane.results import checkpoint, output, store
 from femmembrane.results.finished_scenes import FinishedScenes
 
 from .damage import damaged

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.accuracy.error_estimate import QUANTITIES
+from femmembrane.results.error_estimate import ESTIMATED
 from femmembrane.stability import verdict
 
 from .cases import LIMIT_POINTS, OGDEN, POINTS, disc_scene
@@ -46,7 +46,7 @@ def effectivities(name: str, control: str, degree: int, elements: int, floor: fl
     assert estimate.reason == ""
     found: dict[str, float] = {}
     parts = sum(abs(getattr(estimate, q).value - expected(name, q)) for q in ENERGIES[:2])
-    for quantity in QUANTITIES:
+    for quantity in ESTIMATED:
         if quantity in (control, "center_height") or (quantity == "magnetic_energy" and not BY_NAME[name].scene.sources):
             continue
         part = getattr(estimate, quantity)
@@ -127,7 +127,7 @@ def test_record():
     assert estimate.energy.error == pytest.approx(estimate.elastic_energy.error + estimate.magnetic_energy.error, rel=1e-6)
     assert estimate.energy.scale == abs(eq.elastic_energy) + abs(eq.magnetic_energy)
     assert str(estimate).splitlines()[0] == "at the same volume; " + estimate.method
-    assert len(str(estimate).splitlines()) == 2 + len(QUANTITIES)
+    assert len(str(estimate).splitlines()) == 2 + len(ESTIMATED)
     with pytest.raises(dataclasses.FrozenInstanceError):
         estimate.control = "pressure"
 
@@ -140,7 +140,7 @@ def test_without_a_source_the_magnetic_error_is_none():
 def test_flat_unloaded_disc():
     """Exact on every mesh, and without stiffness."""
     estimate = fm.equilibrium(disc_scene(OGDEN, elements=4), pressure=0.0).error_estimate()
-    assert all(getattr(estimate, quantity).relative == 0 for quantity in QUANTITIES)
+    assert all(getattr(estimate, quantity).relative == 0 for quantity in ESTIMATED)
 
 
 @pytest.mark.parametrize("control", ["gas", "presure", 3, None])
@@ -193,7 +193,7 @@ def test_at_a_limit_point_there_is_no_volume_to_compare(limit_point):
     assert limit_point.pressure > 1.899084863
     estimate = limit_point.error_estimate("pressure")
     assert "no equilibrium near at this pressure" in estimate.reason
-    assert np.isnan([getattr(estimate, q).error for q in QUANTITIES]).all()
+    assert np.isnan([getattr(estimate, q).error for q in ESTIMATED]).all()
     assert np.isnan(estimate.volume.relative)
     at_volume = limit_point.error_estimate("volume")
     assert at_volume.pressure.error == pytest.approx(limit_point.pressure - 1.899084863, rel=0.05)
@@ -247,7 +247,7 @@ def test_where_states_depend_on_the_mesh_there_is_no_estimate(tension_field, wor
     assert branch.status.ill_posed
     estimate = branch[-1].error_estimate()
     assert word in estimate.reason
-    assert np.isnan([getattr(estimate, q).error for q in QUANTITIES]).all()
+    assert np.isnan([getattr(estimate, q).error for q in ESTIMATED]).all()
     assert estimate.pressure.value == branch[-1].pressure
 
 
@@ -321,7 +321,7 @@ def test_round_trip(control, tmp_path, monkeypatch):
 def test_file_explains_itself(tmp_path):
     dataset = fm.run(asked("height", error_estimates=True)).to_xarray()
     assert dataset["error_pressure"].attrs["long_name"] == "estimated error of the pressure, relative"
-    assert list(dataset["estimated"].values) == list(QUANTITIES)
+    assert list(dataset["estimated"].values) == list(ESTIMATED)
     assert all(v.attrs["long_name"] != name for name, v in dataset.variables.items() if "err" in str(name) or name == "estimated")
 
 
@@ -341,4 +341,4 @@ def test_off_means_off(monkeypatch, tmp_path):
 def test_a_branch_without_equilibria_keeps_its_columns():
     branch = fm.run(asked("volume", error_estimates=True))[:0]
     assert "error_pressure" in branch.to_dataframe().columns
-    assert branch.to_xarray()["error_estimate"].shape == (0, len(QUANTITIES))
+    assert branch.to_xarray()["error_estimate"].shape == (0, len(ESTIMATED))

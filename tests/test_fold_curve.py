@@ -13,11 +13,12 @@ import pytest
 import femmembrane as fm
 from femmembrane.errors import InputError, SolveError, Status
 from femmembrane.potential import Family, potential_of
+from femmembrane.results.folds import FoldCurve
 from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.banded import BandFactor, BorderedFactor, band_product
 from femmembrane.solve.continuation import StepControl
 from femmembrane.solve.fold_curve import FoldSegment, WideBorder
-from femmembrane.verbs.folds import FoldCurve, fold_curve
+from femmembrane.verbs.folds import fold_curve
 
 from .cases import OGDEN, disc_scene
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import femmembrane as fm
-from femmembrane.results.lock import NAME, locked
+from femmembrane.lock import NAME, locked
 
 fcntl = pytest.importorskip("fcntl")
 

@@ -11,15 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femmembrane import files
 from femmembrane.discretization.meridian import disc
 from femmembrane.errors import InputError, Status
 from femmembrane.kernels import kernels
+from femmembrane.physics.loads import Weight
 from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
 from femmembrane.results import output, store, table
 from femmembrane.results.records import Branch, SpecialPoint
+from femmembrane.results.verdict import Verdict
 from femmembrane.scene import Analysis, Scene
-from femmembrane.stability.verdict import Verdict
 from femmembrane.verbs import inflate
 
 VOLUMES = [1.0, 2.0, 4.0]
@@ -254,7 +256,7 @@ def test_a_failed_writer_leaves_the_old_file(tmp_path: Path) -> None:
     path.write_text("old")
 
     def write() -> None:
-        with store.replace_file(path) as temporary:
+        with files.replace_file(path) as temporary:
             temporary.write_text("ne")
             raise RuntimeError("midway")
 
@@ -267,7 +269,7 @@ def test_a_failed_writer_leaves_the_old_file(tmp_path: Path) -> None:
 def test_replaced_in_one_step(tmp_path: Path) -> None:
     path = tmp_path / "result.txt"
     path.write_text("old")
-    with store.replace_file(path) as temporary:
+    with files.replace_file(path) as temporary:
         temporary.write_text("new")
         assert path.read_text() == "old"
         assert temporary.parent == path.parent
@@ -285,7 +287,7 @@ def test_every_writer_is_atomic(judged: Branch, tmp_path: Path, monkeypatch: pyt
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(store, "replace", fail)
+        patch.setattr("os.replace", fail)
         for writer, name in ((table.write_csv, "branch.csv"), (store.save, "branch.nc")):
             with pytest.raises(OSError, match="No space"):
                 writer(judged, tmp_path / name)
@@ -351,3 +353,13 @@ def test_unwritable_folder(plain: Branch, tmp_path: Path) -> None:
 def test_read_only_folder(plain: Branch) -> None:
     with pytest.raises(InputError, match="--out"):
         output.write_run(plain, "/proc")
+
+
+def test_every_column_of_the_table_can_be_asked_for():
+    scene = PLAIN.replace(loads=[Weight(0.01)], analysis=BOTH)
+    branch = inflate(scene, volumes=[0.5, 1.0])
+    names = table.columns(branch)
+    assert "load_energy" in names
+    for name, column in zip(names, zip(*table.rows(branch), strict=True), strict=True):
+        assert branch.column(name).tolist() == list(column)
+    assert branch.column("status").tolist() == [Status.CONVERGED.value] * 2

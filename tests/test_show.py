@@ -13,7 +13,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.cli import main
 from femmembrane.physics.outline import Outline
-from femmembrane.stability.zones import KINDS
+from femmembrane.results.zones import KINDS
 from femmembrane.views import movie, picture, surroundings, viewer
 
 from .cases import disc_scene

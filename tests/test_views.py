@@ -14,8 +14,8 @@ from femmembrane.errors import InputError, Status
 from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
 from femmembrane.results.records import Branch, Equilibrium, Jump, SpecialPoint
+from femmembrane.results.verdict import Verdict
 from femmembrane.scene import Analysis, Scene
-from femmembrane.stability.verdict import Verdict
 from femmembrane.verbs import inflate
 from femmembrane.views import picture, plots, vtk, zones
 

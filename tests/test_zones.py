@@ -19,9 +19,10 @@ from femmembrane.cli import main
 from femmembrane.discretization.space import space_of
 from femmembrane.physics.tension_field import TensionField
 from femmembrane.results import output, store, table
+from femmembrane.results.zones import KINDS, Zones
 from femmembrane.stability import zones as zones_module
 from femmembrane.stability.profile import profile_at
-from femmembrane.stability.zones import KINDS, Zones, find_zones
+from femmembrane.stability.zones import find_zones
 
 from .cases import OGDEN, disc_scene
 

@@ -15,7 +15,6 @@ Volumes and verdicts were recorded with this package on 2026-11-22.
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,7 @@ import paper
 from paper import Result, Row
 
 import femmembrane as fm
-from femmembrane.results.store import replace_file
+from femmembrane.files import write_csv
 from femmembrane.views import plots
 
 LOADS = {"a": (600.0, -3.5, 1.85), "b": (200.0, 6.5, 1.8)}
@@ -37,8 +36,7 @@ def words(eq: fm.Equilibrium) -> tuple[str, str, str]:
 
 def save(found: fm.Equilibria, path: Path) -> None:
     rows = [(e, eq.volume, eq.pressure, eq.center_height, *words(eq)) for e, eq in zip(found.energies, found, strict=True)]
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([COLUMNS, *rows])
+    write_csv(path, COLUMNS, rows)
 
 
 def draw(found: dict[str, fm.Equilibria], path: Path) -> None:

@@ -27,7 +27,7 @@ import figure_10
 import paper
 from paper import HEADER, Result, Row
 
-from femmembrane.results.store import replace_file
+from femmembrane.files import replace_file
 
 FIGURES = {3: figure_3, 4: figure_4, 5: figure_5, 6: figure_6, 7: figure_7, 8: figure_8, 9: figure_9, 10: figure_10}
 #: what the short table stands between

@@ -7,7 +7,6 @@ Int. J. Non-Linear Mech. 116 (2019), abbreviated "the paper" here. Parameters ar
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import femmembrane as fm
-from femmembrane.results.store import replace_file
+from femmembrane.files import write_csv
 from femmembrane.views import plots
 
 MATERIAL = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
@@ -86,8 +85,7 @@ class Result:
 
 
 def write_rows(rows: Sequence[Row], path: Path) -> None:
-    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([HEADER, *(row.cells() for row in rows)])
+    write_csv(path, HEADER, (row.cells() for row in rows))
 
 
 def show(rows: Sequence[Row]) -> None:

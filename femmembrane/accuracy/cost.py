@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
+from ..results.cost import STARTS, Measurement, Reference
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CONTROLS
 from ..solve.minimize import minimize_and_verify, nlp_functions
@@ -30,7 +31,6 @@ from .strong_form import Guess, Solution
 Clock = Callable[[], float]
 
 SOLVERS: Mapping[str, Corrector] = {"newton": correct, "ipopt": minimize_and_verify}
-STARTS = ("warm", "cold")
 #: the independent methods and the tolerances at which each is measured; shooting as published is slow
 METHODS: Mapping[str, Callable[..., Solution]] = {"shooting": shoot, "collocation": collocate, "published": shoot_as_published}
 TOLERANCES: Mapping[str, tuple[float, ...]] = {
@@ -47,57 +47,6 @@ _ANOTHER = 0.5
 _TURN, _MOST_CALLS, _BUILDS = 0.01, 50, 3
 #: errors of a reference below this are not claimed
 _ROUND_OFF = 1e-14
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """One line of a study.
-
-    Attributes
-    ----------
-    what : str
-        ``solve``: one equilibrium; ``stage``: a part of the work on it; ``effect``: an equilibrium without or with an effect.
-    method : str
-        ipopt or newton (finite elements), shooting, collocation, published; the name of the stage or effect.
-    start : str
-        warm (a neighbouring state is known) or cold; of an effect, off or on.
-    degree, elements, unknowns : int or None
-        Of the finite elements.
-    tolerance : float or None
-        Of a method with a tolerance in place of a mesh.
-    error : float
-        Relative, against the reference: of the pressure, or under pressure control of the volume. NaN where none is defined.
-    milliseconds : float
-        Median wall time; NaN if nothing came of it.
-    setup_milliseconds : float
-        What the first solve on a mesh takes longer than the others: building and, for IPOPT, compiling the problem.
-    iterations, evaluations : int or None
-        Of the solver, rejected steps included; right-hand sides of the independent methods.
-    repeats : int
-        How many times the median is of.
-    converged : bool
-    front : bool
-        Whether nothing with the same start is both faster and more accurate.
-    message : str
-        Why it did not converge.
-    """
-
-    what: str
-    method: str
-    start: str = ""
-    degree: int | None = None
-    elements: int | None = None
-    unknowns: int | None = None
-    tolerance: float | None = None
-    error: float = np.nan
-    milliseconds: float = np.nan
-    setup_milliseconds: float = np.nan
-    iterations: int | None = None
-    evaluations: int | None = None
-    repeats: int = 0
-    converged: bool = True
-    front: bool = False
-    message: str = ""
 
 
 @dataclass(frozen=True)
@@ -207,25 +156,6 @@ def with_front(lines: Sequence[Measurement], floor: float) -> tuple[Measurement,
             if error < best:
                 marked[k], best = replace(lines[k], front=True), error
     return tuple(marked)
-
-
-@dataclass(frozen=True)
-class Reference:
-    """The equilibrium that errors are measured against.
-
-    Attributes
-    ----------
-    value : float
-        The pressure, or under pressure control the volume.
-    error : float
-        Relative difference from elements of twice the size, an upper estimate of its own error (at least 1e-14).
-    elements, degree : int
-    """
-
-    value: float
-    error: float
-    elements: int
-    degree: int
 
 
 class Course:

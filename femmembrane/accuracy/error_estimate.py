@@ -9,12 +9,13 @@ There the finer space has quartered elements of one degree more.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
 
 import numpy as np
 
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
+from ..results.error_estimate import ErrorEstimate, from_numbers
+from ..results.verdict import Verdict
 from ..scene import MAX_DEGREE, Scene
 from ..solve.banded import negative_directions
 from ..solve.controls import CONTROLS, control_kind
@@ -24,80 +25,7 @@ from ..solve.state import State
 from ..solve.state_resolution import unresolved
 from ..solve.wellposed import ill_posed
 from ..stability.spectrum import SpectrumError
-from ..stability.verdict import Verdict, axisymmetric_verdict
-
-
-@dataclass(frozen=True)
-class Deviation:
-    """A number and the estimate of its error.
-
-    Attributes
-    ----------
-    value : float
-        As computed.
-    error : float
-        Signed: value minus the number of the finer space; 0 for what is held, NaN where there is no estimate.
-    scale : float
-        What the relative error is relative to.
-    """
-
-    value: float
-    error: float
-    scale: float
-
-    @property
-    def absolute(self) -> float:
-        """Size of the error."""
-        return abs(self.error)
-
-    @property
-    def relative(self) -> float:
-        """Size of the error over the scale: that of the value, for the total energy the sum of the sizes of its two parts."""
-        if self.error == 0 or np.isnan(self.error):
-            return self.error + 0.0
-        return abs(self.error) / self.scale if self.scale else np.inf
-
-
-@dataclass(frozen=True)
-class ErrorEstimate:
-    """Estimated discretisation errors of one equilibrium.
-
-    Attributes
-    ----------
-    control : {"volume", "pressure", "center_height"}
-        What is held while the space is refined: its own error is 0.
-    pressure, volume, center_height, elastic_energy, magnetic_energy, energy : Deviation
-        ``energy`` is elastic, magnetic and load energy together.
-    lambda_pressure, lambda_volume : Deviation
-        Smallest eigenvalues of the second variation under pressure and volume control.
-    method : str
-        What was compared.
-    reason : str
-        Why errors are NaN; empty when there is an estimate of all of them.
-    """
-
-    control: str
-    pressure: Deviation
-    volume: Deviation
-    center_height: Deviation
-    elastic_energy: Deviation
-    magnetic_energy: Deviation
-    energy: Deviation
-    lambda_pressure: Deviation
-    lambda_volume: Deviation
-    method: str
-    reason: str = ""
-
-    def __str__(self) -> str:
-        lines = [f"at the same {CONTROLS[self.control].words}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
-        for name in QUANTITIES:
-            d: Deviation = getattr(self, name)
-            lines.append(f"{name.replace('_', ' '):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
-        return "\n".join(lines + ([self.reason] if self.reason else []))
-
-
-#: what an estimate is about, in its order
-QUANTITIES = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
+from ..stability.verdict import axisymmetric_verdict
 
 
 def estimate_errors(potential: Potential, x: Array, pressure: float, control: str, verdicts: Mapping[str, Verdict]) -> ErrorEstimate:
@@ -219,11 +147,3 @@ def _compared(control: str, values: Mapping[str, float], better: Mapping[str, fl
 
 def _without(control: str, values: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
     return from_numbers(control, values, dict.fromkeys(values, np.nan), method, reason)
-
-
-def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
-    """The record of values and errors by name."""
-    scales = {name: abs(value) for name, value in values.items()}
-    scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
-    parts = {name: Deviation(values[name], errors[name], scales[name]) for name in QUANTITIES}
-    return ErrorEstimate(control_kind(control).name, **parts, method=method, reason=reason)

@@ -72,8 +72,8 @@ def working(out: Path, names: Iterable[str] = (), folders: Iterable[str] = ()) -
         When the folder cannot be written to, when something that is not to be replaced stands in the way, or when it is in use.
     """
     made = _make(out)
-    from ..results.files import refuse_obstacles, remove_leftovers
-    from ..results.lock import locked
+    from ..files import refuse_obstacles, remove_leftovers
+    from ..lock import locked
 
     try:
         refuse_obstacles(out, names, folders)

@@ -34,7 +34,7 @@ def report(folder: Path, /, *, out: Path | None = None) -> int:
 
 def write(folder: Path, out: Path | None = None) -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
-    from ..results.files import remove_leftovers
+    from ..files import remove_leftovers
     from ..results.output import read_record
     from ..views.report import write_report
 

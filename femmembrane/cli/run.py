@@ -44,7 +44,7 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
     """
     asked = read(scene, changes)
     from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
-    from ..results.files import RUN_FILES, SURFACES_FOLDER
+    from ..results.output import RUN_FILES, SURFACES_FOLDER
 
     with working(out, (*RUN_FILES, NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
         kept = unfinished(out) if resume else None

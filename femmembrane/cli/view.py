@@ -37,7 +37,7 @@ def view(
     movie
         GIF or MP4 file to write (MP4 with imageio[ffmpeg] installed).
     """
-    from ..results.files import remove_leftovers
+    from ..files import remove_leftovers
     from ..views.viewer import view as show
 
     for file in filter(None, (screenshot, movie)):

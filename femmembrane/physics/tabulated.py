@@ -85,7 +85,7 @@ class Tabulated(Source):
         InputError
             When the file cannot be read, or its points are no grid.
         """
-        from ..results.files import read_bytes
+        from ..files import read_bytes
 
         try:
             lines = [line for line in read_bytes(path).decode("utf-8-sig").splitlines() if line.strip()]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .origin import difference, origin
+from ..origin import difference, origin
 from .store import branch_of, read_branch_file, save
 from .table import columns, estimated, value
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .store import package_version
+from ..origin import package_version
 
 if TYPE_CHECKING:
     from .records import Branch

@@ -17,7 +17,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import InputError
-from .files import refuse_strange
+from ..files import refuse_strange
 
 _ALLOWED = "a folder that one sweep at a time may write to is needed"
 #: what SQLite writes beside its file

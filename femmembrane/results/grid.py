@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ..errors import InputError
-from .store import package_version, read_dataset, reason, write_dataset
+from ..origin import package_version
+from .store import read_dataset, reason, write_dataset
 
 if TYPE_CHECKING:
     import xarray

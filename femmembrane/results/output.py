@@ -15,14 +15,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, NotWrittenError, Status
+from ..files import read_bytes, refuse_obstacles, replace_file
 from ..kernels import kernels
-from .files import RECORD, RUN_FILES, SURFACES_FOLDER, read_bytes, refuse_obstacles
-from .origin import NOTED_VERSIONS
-from .store import package_version, reason, replace_file, save
+from ..origin import NOTED_VERSIONS, package_version
+from . import door
+from .store import reason, save
 from .table import write_csv, write_special_points_csv, write_zones_csv
 
 if TYPE_CHECKING:
     from .records import Branch
+
+#: the record of a run, which makes its folder complete, and all files of one, in the order in which they are listed
+RECORD = "run.json"
+RUN_FILES = (
+    *("branch.csv", "special_points.csv", "zones.csv", RECORD),
+    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
+    "report.html",  # written from the rest, by whom it is asked for
+)
+#: the folder of the surfaces of a run
+SURFACES_FOLDER = "membrane"
 
 
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:
@@ -53,15 +64,13 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     NotWrittenError
         When some files could not be written (a full disk); all others were.
     """
-    from ..views.vtk import remove_surfaces
-
     folder = _writable(Path(directory))
     refuse_obstacles(folder, RUN_FILES, (SURFACES_FOLDER,))
     writers = _writers(branch, command)
     for stale in {*RUN_FILES, RECORD} - (writers.keys() - {RECORD}):
         (folder / stale).unlink(missing_ok=True)
     if SURFACES not in writers:
-        remove_surfaces(folder / SURFACES)
+        door.remove_surfaces(folder / SURFACES)
     failed: dict[str, OSError] = {}
     for name in sorted(writers, key=_WRITTEN.index):
         if name == RECORD and failed:
@@ -136,31 +145,26 @@ _WRITTEN = ("branch.nc", *(name for name in RUN_FILES if name not in ("branch.nc
 
 def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Callable[[Path], object]]:
     """How each file that this branch gets is written."""
-    from ..views.plots import plot_pressure_volume, plot_zones
-    from ..views.vtk import write_vtk
-
     writers: dict[str, Callable[[Path], object]] = {"branch.csv": partial(write_csv, branch)}
     if branch.special_points is not None:
         writers["special_points.csv"] = partial(write_special_points_csv, branch)
     if branch.scene.analysis.wrinkling:
         writers["zones.csv"] = partial(write_zones_csv, branch)
     if len(branch):
-        writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(plot_pressure_volume, branch)}
-        writers[SURFACES] = partial(write_vtk, branch)
+        writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(door.plot_pressure_volume, branch)}
+        writers[SURFACES] = partial(door.write_vtk, branch)
         if branch.scene.analysis.wrinkling:
-            writers["zones.png"] = partial(plot_zones, branch)
+            writers["zones.png"] = partial(door.plot_zones, branch)
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
     return writers
 
 
 def _drop(path: Path) -> None:
     """Remove a file of an earlier run that this run could not replace."""
-    from ..views.vtk import remove_surfaces
-
     with contextlib.suppress(OSError):
         path.unlink(missing_ok=True)
         if path.name == SURFACES:
-            remove_surfaces(path)
+            door.remove_surfaces(path)
 
 
 def _writable(folder: Path) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -12,17 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
-from ..errors import InputError, Status, printable, unknown_name
+from ..errors import InputError, Status, printable
+from ..solve.controls import control_kind
 from ..threads import one_thread
+from . import door
 
 if TYPE_CHECKING:
-    from ..accuracy.error_estimate import ErrorEstimate
     from ..potential import Potential
     from ..scene import Scene
     from ..solve.controls import Gas
-    from ..stability.frequencies import Vibration
-    from ..stability.verdict import Verdict
-    from ..stability.zones import Zones
+    from .error_estimate import ErrorEstimate
+    from .verdict import Verdict
+    from .vibration import Vibration
+    from .zones import Zones, ZonesAlong
 
 Array = NDArray[np.float64]
 
@@ -114,11 +115,9 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        from ..stability.profile import profile_at
-
         space = self.potential.space
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
-        return profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
@@ -152,11 +151,9 @@ class Equilibrium:
 
     @one_thread
     def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
-        from ..stability.checked_verdict import checked_verdict
-
         evaluation = self.potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
-        return checked_verdict(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+        return door.checked_verdict(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:
@@ -178,9 +175,7 @@ class Equilibrium:
         SolveError
             Where a compressive stress leaves the spectrum without a lowest eigenvalue.
         """
-        from ..stability.frequencies import natural_frequencies
-
-        return natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
+        return door.natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
 
     def zones(self, criterion: str | None = None) -> Zones:
         """Taut and wrinkled zones by the signs of the principal stresses, from the pole to the rim; computed once and remembered.
@@ -197,11 +192,9 @@ class Equilibrium:
         InputError
             For an unknown criterion.
         """
-        from ..stability import zones
-
         criterion = (self.scene.analysis.wrinkling or "total") if criterion is None else criterion
         if not isinstance(criterion, str) or criterion not in self._zones:
-            self._zones[criterion] = zones.find_zones(self.scene, self.state, self.pressure, criterion)
+            self._zones[criterion] = door.find_zones(self.scene, self.state, self.pressure, criterion)
         return self._zones[criterion]
 
     @one_thread
@@ -221,20 +214,15 @@ class Equilibrium:
         InputError
             For an unknown control.
         """
-        from ..accuracy.error_estimate import estimate_errors
-        from ..solve.controls import control_kind
-
         control = control_kind(control).name
         if control not in self._errors:
             verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
-            self._errors[control] = estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
+            self._errors[control] = door.estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
         return self._errors[control]
 
     def _repr_html_(self) -> str:
         """Numbers and verdicts with the deformed meridian, for notebooks."""
-        from ..views.notebook import equilibrium_html
-
-        return equilibrium_html(self)
+        return door.equilibrium_html(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -396,8 +384,8 @@ class Branch(Sequence[Equilibrium]):
         Parameters
         ----------
         name : str
-            step, an attribute of :class:`Equilibrium`, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind of
-            zones, when the scene has scales, pressure_pa, and when it asks for error estimates, error_ with what they are of (relative
+            step, any column of the table, status, an energy, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind
+            of zones, when the scene has scales, pressure_pa, and when it asks for error estimates, error_ with what they are of (relative
             errors at the load that its [run] prescribes, else at the volume).
 
         Raises
@@ -405,29 +393,9 @@ class Branch(Sequence[Equilibrium]):
         InputError
             For an unknown name.
         """
-        from ..stability.zones import KINDS
-        from .table import estimated
+        from .table import column
 
-        if name == "step":
-            return np.arange(len(self))
-        kind, _, what = name.partition("_")
-        if kind in ("lambda", "verdict") and (what in _SHOWN or re.fullmatch(r"n[1-9]\d*", what)):
-            verdicts = [eq.verdict(what) if what in _SHOWN else eq.verdict(azimuthal=int(what[1:])) for eq in self]
-            return np.array([v.smallest_eigenvalue if kind == "lambda" else v.word for v in verdicts])
-        if kind == "fraction" and what in KINDS:
-            return np.array([eq.zones().fraction(what) for eq in self], dtype=np.float64)
-        held, errors = estimated(self.scene)
-        if kind == "error" and what in errors:
-            return np.array([getattr(eq.error_estimate(held), what).relative for eq in self], dtype=np.float64)
-        scales = self.scene.scales
-        if name == "pressure_pa" and scales is not None:
-            return scales.to_si("pressure", self.column("pressure"))
-        known = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "residual", "iterations", "status", "seconds")
-        if name not in known:
-            more = [*(f"{k}_{c}" for k in ("lambda", "verdict") for c in _SHOWN), *(f"fraction_{k}" for k in KINDS)]
-            more += [f"error_{e}" for e in errors]
-            raise unknown_name("column", name, ("step", *known, *more, *(["pressure_pa"] if scales else [])))
-        return np.array([getattr(eq, name) for eq in self])
+        return column(self, name)
 
     def __str__(self) -> str:
         classes = self.scene.analysis.stability or _SHOWN
@@ -460,6 +428,10 @@ class Branch(Sequence[Equilibrium]):
         repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
         return self.remarks if self.scene.open else (*self.remarks, *repaired, *space_of_scene(self.scene).notes)
 
+    def zones_along(self) -> ZonesAlong:
+        """Zones of all equilibria and, where their kinds change from one to the next, of states between them."""
+        return door.zones_along(self)
+
     def to_dataframe(self) -> Any:
         """The table as a pandas DataFrame."""
         from .table import to_dataframe
@@ -480,21 +452,15 @@ class Branch(Sequence[Equilibrium]):
 
     def to_vtk(self, path: str | PathLike[str]) -> None:
         """Write a ParaView collection (.pvd) with one VTU file a step."""
-        from ..views.vtk import write_vtk
-
-        write_vtk(self, path)
+        door.write_vtk(self, path)
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Pressure against volume as a Matplotlib figure, also written to ``path`` if given."""
-        from ..views.plots import plot_pressure_volume
-
-        return plot_pressure_volume(self, path)
+        return door.plot_pressure_volume(self, path)
 
     def report(self, path: str | PathLike[str]) -> None:
         """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings."""
-        from ..views.report import write_report
-
-        write_report(self, path)
+        door.write_report(self, path)
 
     def cite(self) -> str:
         """BibTeX of what the computation used."""
@@ -504,9 +470,7 @@ class Branch(Sequence[Equilibrium]):
 
     def _repr_html_(self) -> str:
         """The table and the pressure-volume diagram, for notebooks."""
-        from ..views.notebook import branch_html
-
-        return branch_html(self)
+        return door.branch_html(self)
 
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:

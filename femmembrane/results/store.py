@@ -1,4 +1,4 @@
-"""Branches on disk: NetCDF files that hold a computation whole, and the one way in which the package writes files.
+"""Branches on disk: NetCDF files that hold a computation whole.
 
 A file is one data set with the dimensions ``step`` (equilibria), ``node`` (points along the meridian), ``coefficient`` (the state) and,
 when the branch was searched for them, ``special_point`` and ``zone``. The state is kept to the last bit, so that a loaded equilibrium is
@@ -13,93 +13,31 @@ import os
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from importlib import metadata
-from os import PathLike, replace
-from pathlib import Path
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import files
 from ..discretization.meridian import side
 from ..errors import InputError, Status
-from . import files
+from ..origin import package_version
+from .error_estimate import ESTIMATED, ErrorEstimate, from_numbers
+from .quantities import QUANTITIES, typed
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import xarray
 
-    from ..accuracy.error_estimate import ErrorEstimate
     from ..scene import Scene
-    from ..stability.verdict import Verdict
     from .records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 
 FORMAT = 1
 #: attribute of files that count the volume that a membrane encloses as positive wherever it is; before, one with its inside above did not
 _INSIDE = ("inside", "where the membrane encloses a volume, below where it is flat")
-
-_STRESSES = {
-    "mechanical_stress_1": "meridional mechanical stress",
-    "mechanical_stress_2": "circumferential mechanical stress",
-    "total_stress_1": "meridional total stress",
-    "total_stress_2": "circumferential total stress",
-}
-#: long_name and units (1: non-dimensional) of every quantity that appears in a file
-MEANING: Mapping[str, tuple[str, str]] = {
-    "step": ("number of the equilibrium along the branch", "1"),
-    "volume": ("enclosed volume V/R0^3, signed", "1"),
-    "pressure": ("pressure P = p R0/(mu T)", "1"),
-    "pressure_pa": ("pressure p", "Pa"),
-    "center_height": ("height of the pole, or the first point of the meridian, over R0", "1"),
-    "elastic_energy": ("elastic energy over mu T R0^2", "1"),
-    "magnetic_energy": ("magnetic energy over mu T R0^2", "1"),
-    "load_energy": ("energy of the loads over mu T R0^2", "1"),
-    "residual": ("out-of-balance force relative to the forces in balance", "1"),
-    "iterations": ("solver iterations, rejected attempts included", "1"),
-    "seconds": ("wall time spent on the equilibrium", "s"),
-    "status": ("how the solve ended", "1"),
-    "state": ("displacement coefficients over R0 on the free degrees of freedom", "1"),
-    "r": ("reference radius of the node over R0", "1"),
-    "s": ("arc length of the reference meridian from its first end to the node, over R0", "1"),
-    "rho": ("deformed radius over R0", "1"),
-    "eta": ("deformed height over R0", "1"),
-    "stretch_1": ("meridional stretch", "1"),
-    "stretch_2": ("circumferential stretch", "1"),
-    **{name: (f"{stress} over mu", "1") for name, stress in _STRESSES.items()},
-    **{f"{name}_pa": (stress, "Pa") for name, stress in _STRESSES.items()},
-    "kind": ("kind of the special point", "1"),
-    "error": ("uncertainty of the special point's location", "1"),
-    "tangent": ("direction of the branch on which it was found, in the unknowns and the pressure", "1"),
-    "azimuthal": ("number of waves around the axis of the instability that sets in", "1"),
-    "trace_sigma": ("arc length, or load, at the last points of the path", "1"),
-    "trace_point": ("state and pressure at the last points of the path", "1"),
-    "trace_slope": ("their derivatives with respect to arc length or load", "1"),
-    "jump_index": ("number of the equilibrium that a snap of the membrane landed on", "1"),
-    "jump_limit": ("whether the fold before the snap was located", "1"),
-    "fraction_taut": ("part of the reference area that is taut", "1"),
-    "fraction_radial": ("part of the reference area with radial wrinkles (only s22 < 0)", "1"),
-    "fraction_circumferential": ("part of the reference area with circumferential wrinkles (only s11 < 0)", "1"),
-    "fraction_double": ("part of the reference area with wrinkles both ways (s11 < 0 and s22 < 0)", "1"),
-    "error_pressure": ("estimated error of the pressure, relative", "1"),
-    "error_volume": ("estimated error of the volume, relative", "1"),
-    "error_energy": ("estimated error of elastic plus magnetic energy, over the sum of their sizes", "1"),
-    "estimated": ("quantity whose error is estimated", "1"),
-    "error_value": ("quantity at the equilibrium whose error is estimated", "1"),
-    "error_estimate": ("its estimated error, signed", "1"),
-    "error_control": ("what is held while the error is estimated", "1"),
-    "error_method": ("how the error is estimated", "1"),
-    "error_reason": ("why there is no estimate of the error", "1"),
-    "zone_step": ("number of the equilibrium that the zone belongs to", "1"),
-    "zone_kind": ("kind of the zone", "1"),
-    "zone_r_start": ("reference radius over R0 at which the zone starts", "1"),
-    "zone_r_end": ("reference radius over R0 at which the zone ends", "1"),
-    "zone_rho_start": ("deformed radius over R0 at which the zone starts", "1"),
-    "zone_rho_end": ("deformed radius over R0 at which the zone ends", "1"),
-    "zone_area_fraction": ("part of the reference area in the zone", "1"),
-    "zone_deformed_area_fraction": ("part of the deformed area in the zone", "1"),
-}
 
 Array = NDArray[np.float64]
 #: a variable of a data set: dimensions and values
@@ -116,40 +54,6 @@ _UNCOUNTED = -1
 _PATIENCE = 60.0
 #: bytes of values that one byte of a file may hold at most: what its compression reaches
 _UNFOLDED = 1100
-
-
-@contextmanager
-def replace_file(path: str | PathLike[str]) -> Iterator[Path]:
-    """Write a file whole or not at all.
-
-    Yields the name of a temporary file in the same folder, with the same suffix. When the block ends well it takes the place of ``path``
-    in one step; when the block raises, ``path`` stays as it was and the temporary file is gone.
-
-    Raises
-    ------
-    InputError
-        When the folder does not exist or cannot be written to, or when a link, a pipe, a device or a folder has the name: none is replaced.
-    """
-    path = Path(path)
-    if not path.name or "\0" in str(path):
-        raise InputError("path", str(path), "the name of a file in an existing, writable folder is needed")
-    _refuse_strange(path)
-    temporary = files.temporary_name(path)
-    try:
-        with files.claimed(temporary):
-            yield temporary
-            _refuse_strange(path)  # it may have come in between
-            replace(temporary, path)
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
-        raise InputError("path", str(path), f"a file in an existing, writable folder is needed ({error.strerror})") from error
-    finally:
-        if temporary.parent.is_dir():
-            temporary.unlink(missing_ok=True)
-
-
-def _refuse_strange(path: Path) -> None:
-    if what := files.strange(path):
-        raise InputError("path", str(path), f"it is {what}, which no file replaces; another name is allowed")
 
 
 def to_xarray(branch: Branch) -> xarray.Dataset:
@@ -171,8 +75,8 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
         variables |= _special_variables(branch.special_points, width, _SPECIAL)
     if branch.jumps:
         limits = [jump.limit for jump in branch.jumps if jump.limit is not None]
-        variables["jump_index"] = ("jump",), _array("jump_index", (jump.index for jump in branch.jumps))
-        variables["jump_limit"] = ("jump",), _array("jump_limit", (jump.limit is not None for jump in branch.jumps))
+        variables["jump_index"] = ("jump",), typed("jump_index", (jump.index for jump in branch.jumps))
+        variables["jump_limit"] = ("jump",), typed("jump_limit", (jump.limit is not None for jump in branch.jumps))
         variables |= _special_variables(limits, width, _LIMIT)
     if branch.memory is not None:
         variables["trace_sigma"] = ("trace",), np.array(branch.memory.sigma)
@@ -200,7 +104,7 @@ def write_dataset(dataset: xarray.Dataset, path: str | PathLike[str], encoding: 
     marked = dataset.assign_attrs(seal=f"{files.SEAL} its digest is the last line of the file, and of all before that line")
     marked.to_netcdf(image, engine="h5netcdf", encoding=encoding)
     content = files.sealed(image.getvalue())
-    with replace_file(path) as temporary:
+    with files.replace_file(path) as temporary:
         temporary.write_bytes(content)
 
 
@@ -248,20 +152,12 @@ def scene_from_text(text: str) -> Scene:
     return Scene.from_dict(tomllib.loads(text))
 
 
-def package_version(name: str = "femmembrane") -> str:
-    """Version of an installed distribution, or ``unknown`` (a source tree that was never installed)."""
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return "unknown"
-
-
 def _table_variables(branch: Branch) -> dict[str, _Variable]:
     from .table import columns, rows
 
     names, table = columns(branch), list(rows(branch))
     cells = zip(*table, strict=True) if table else ([] for _ in names)
-    return {name: (("step",), _array(name, column)) for name, column in zip(names, cells, strict=True)}
+    return {name: (("step",), typed(name, column)) for name, column in zip(names, cells, strict=True)}
 
 
 def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, _Variable]:
@@ -273,9 +169,9 @@ def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimens
     }
     scalars = [name for name in _SCALARS if name not in absent]
     return {
-        **{prefix + name: ((dimension,), _array(name, (getattr(e, name) for e in equilibria))) for name in scalars},
-        prefix + "iterations": ((dimension,), _array("iterations", (e.iterations for e in equilibria))),
-        prefix + "status": ((dimension,), _array("status", (e.status.value for e in equilibria))),
+        **{prefix + name: ((dimension,), typed(name, (getattr(e, name) for e in equilibria))) for name in scalars},
+        prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
+        prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
         prefix + "state": ((dimension, "coefficient"), np.array([e.state for e in equilibria]).reshape(len(equilibria), width)),
     }
 
@@ -298,10 +194,10 @@ def _verdict_variables(tag: str, verdicts: Sequence[Verdict]) -> dict[str, _Vari
     """All of the verdicts of one class that the columns of the table leave out, and :func:`_verdicts` needs to build them again."""
     counts = (_UNCOUNTED if v.negative_directions is None else v.negative_directions for v in verdicts)
     variables: dict[str, _Variable] = {
-        f"verdict_{tag}": (("step",), _array("verdict_", (v.word for v in verdicts))),
-        f"lambda_error_{tag}": (("step",), _array("error", (v.error for v in verdicts))),
-        f"negative_directions_{tag}": (("step",), _array("negative_directions", counts)),
-        f"reason_{tag}": (("step",), _array("reason", (v.reason for v in verdicts))),
+        f"verdict_{tag}": (("step",), typed("verdict_", (v.word for v in verdicts))),
+        f"lambda_error_{tag}": (("step",), typed("error", (v.error for v in verdicts))),
+        f"negative_directions_{tag}": (("step",), typed("negative_directions", counts)),
+        f"reason_{tag}": (("step",), typed("reason", (v.reason for v in verdicts))),
     }
     shapes = [_shape(v) for v in verdicts]
     for key, known in next((s for s in shapes if s), {}).items():
@@ -324,23 +220,22 @@ def _zone_variables(branch: Branch) -> dict[str, _Variable]:
 
     table = list(zone_rows(branch))
     columns = zip(*table, strict=True) if table else ([] for _ in ZONE_COLUMNS)
-    return {f"zone_{name}": (("zone",), _array(name, column)) for name, column in zip(ZONE_COLUMNS, columns, strict=True)}
+    return {f"zone_{name}": (("zone",), typed(name, column)) for name, column in zip(ZONE_COLUMNS, columns, strict=True)}
 
 
 def _estimate_variables(branch: Branch) -> dict[str, _Variable]:
     """All of the error estimates, which :func:`_estimates` needs to build them again."""
-    from ..accuracy.error_estimate import QUANTITIES
     from .table import estimated
 
     found = [eq.error_estimate(estimated(branch.scene)[0]) for eq in branch]
     parts = {"error_value": "value", "error_estimate": "error"}
     words = {"error_control": "control", "error_method": "method", "error_reason": "reason"}
     numbers = {
-        variable: np.array([[getattr(getattr(e, q), part) for q in QUANTITIES] for e in found]).reshape(len(found), len(QUANTITIES))
+        variable: np.array([[getattr(getattr(e, q), part) for q in ESTIMATED] for e in found]).reshape(len(found), len(ESTIMATED))
         for variable, part in parts.items()
     }
     return {
-        "estimated": (("estimated",), np.array(QUANTITIES, dtype=str)),
+        "estimated": (("estimated",), np.array(ESTIMATED, dtype=str)),
         **{variable: (("step", "estimated"), values) for variable, values in numbers.items()},
         **{variable: (("step",), np.array([getattr(e, word) for e in found], dtype=str)) for variable, word in words.items()},
     }
@@ -348,8 +243,8 @@ def _estimate_variables(branch: Branch) -> dict[str, _Variable]:
 
 def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, _Variable]:
     dimension = prefix + "point"
-    numbers = {prefix + name: ((dimension,), _array(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
-    kinds: dict[str, _Variable] = {prefix + "kind": ((dimension,), _array("kind", (str(p.kind) for p in points)))}
+    numbers = {prefix + name: ((dimension,), typed(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
+    kinds: dict[str, _Variable] = {prefix + "kind": ((dimension,), typed("kind", (str(p.kind) for p in points)))}
     tangents: dict[str, _Variable] = {}
     if any(p.tangent is not None for p in points):
         none = np.full(width + 1, np.nan)
@@ -358,19 +253,11 @@ def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) 
     return {**kinds, **numbers, **tangents, **states}
 
 
-def _array(name: str, values: Iterable[Any]) -> NDArray[Any]:
-    """Values of a column in the type that the file gives it, whatever their number."""
-    if name in ("step", "iterations", "negative_directions", "azimuthal", "jump_index", "jump_limit"):
-        return np.array(list(values), dtype=np.int64)
-    if name in ("status", "kind", "reason") or name.startswith("verdict_"):
-        return np.array(list(values), dtype=str)
-    return np.array(list(values), dtype=np.float64)
-
-
 def _describe(name: str) -> dict[str, str]:
     prefix = next((p for p in (_SPECIAL, _LIMIT) if name.startswith(p)), "")
     base = name.removeprefix(prefix).removeprefix("equilibrium_")
-    meaning, unit = MEANING.get(base) or (_about_verdict(base), "1")
+    known = QUANTITIES.get(base)
+    meaning, unit = (_about_verdict(base), "1") if known is None else (known.meaning, known.unit)
     return {"long_name": meaning if base == name else f"{meaning}, at the special point", "units": unit}
 
 
@@ -620,7 +507,6 @@ def _unknowns(scene: Scene) -> int:
 
 
 def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal: int) -> Iterator[Verdict]:
-    from ..stability.verdict import Verdict
 
     parts = {str(name).removeprefix(f"mode_{tag}_"): v.values for name, v in dataset.items() if str(name).startswith(f"mode_{tag}_")}
     for k in range(dataset.sizes["step"]):
@@ -642,7 +528,6 @@ def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal:
 
 
 def _estimates(dataset: xarray.Dataset) -> Iterator[ErrorEstimate]:
-    from ..accuracy.error_estimate import from_numbers
 
     if "error_estimate" not in dataset:
         return

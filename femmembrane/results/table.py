@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import io
+import re
 from collections.abc import Iterator
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from ..stability.zones import KINDS
-from .store import replace_file
+from numpy.typing import NDArray
+
+from .. import files
+from ..errors import unknown_name
+from .quantities import typed
+from .zones import KINDS
 
 if TYPE_CHECKING:
     import pandas
@@ -63,11 +66,11 @@ def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume"
     if column == "step":
         return step
     kind, _, name = column.partition("_")
-    if kind == "verdict":
-        return equilibrium.verdict(name).word
-    if kind == "lambda":
+    if kind in ("verdict", "lambda"):
         verdict = equilibrium.verdict(azimuthal=int(name[1:])) if name[1:].isdigit() else equilibrium.verdict(name)
-        return float(verdict.smallest_eigenvalue)
+        return verdict.word if kind == "verdict" else float(verdict.smallest_eigenvalue)
+    if column == "status":
+        return equilibrium.status.value
     scales = equilibrium.scene.scales
     if column == "pressure_pa" and scales is not None:
         return scales.to_si("pressure", equilibrium.pressure)
@@ -80,6 +83,30 @@ def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume"
     return float(getattr(equilibrium, column))
 
 
+def known_columns(branch: Branch) -> list[str]:
+    """What :meth:`Branch.column` may be asked for: :func:`columns`, and what costs a look at the equilibria only when it is asked for.
+
+    Verdicts against azimuthal perturbations of any number of waves are left out of the list.
+    """
+    more = [*("magnetic_energy", "load_energy", "status"), *(f"{k}_{c}" for k in ("lambda", "verdict") for c in CONTROLS)]
+    return list(dict.fromkeys([*columns(branch), *more, *(f"fraction_{kind}" for kind in KINDS)]))
+
+
+def column(branch: Branch, name: str) -> NDArray[Any]:
+    """One column, of the type of its quantity.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    known = known_columns(branch)
+    if name not in known and not (isinstance(name, str) and re.fullmatch(r"(lambda|verdict)_n[1-9]\d*", name)):
+        raise unknown_name("column", name, known)
+    held, _ = estimated(branch.scene)
+    return typed(name, (value(equilibrium, step, name, held) for step, equilibrium in enumerate(branch)))
+
+
 def rows(branch: Branch) -> Iterator[list[float | int | str]]:
     """The rows of the table, in the order of :func:`columns`."""
     names, (held, _) = columns(branch), estimated(branch.scene)
@@ -88,8 +115,8 @@ def rows(branch: Branch) -> Iterator[list[float | int | str]]:
 
 
 def write_csv(branch: Branch, path: str | PathLike[str]) -> None:
-    """Write :func:`rows` under a header line; numbers keep their full double precision."""
-    _write(path, columns(branch), rows(branch))
+    """Write :func:`rows` under a header line, with :func:`femmembrane.files.write_csv`."""
+    files.write_csv(path, columns(branch), rows(branch))
 
 
 def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
@@ -105,7 +132,7 @@ def special_point_columns(branch: Branch) -> list[str]:
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the special points; no rows means that the branch was searched and has none."""
-    _write(path, special_point_columns(branch), special_point_rows(branch))
+    files.write_csv(path, special_point_columns(branch), special_point_rows(branch))
 
 
 def zone_rows(branch: Branch) -> Iterator[list[Any]]:
@@ -117,7 +144,7 @@ def zone_rows(branch: Branch) -> Iterator[list[Any]]:
 
 def write_zones_csv(branch: Branch, path: str | PathLike[str]) -> None:
     """Write the zones by the criterion of the scene."""
-    _write(path, list(ZONE_COLUMNS), zone_rows(branch))
+    files.write_csv(path, list(ZONE_COLUMNS), zone_rows(branch))
 
 
 def to_dataframe(branch: Branch) -> pandas.DataFrame:
@@ -125,12 +152,3 @@ def to_dataframe(branch: Branch) -> pandas.DataFrame:
     import pandas
 
     return pandas.DataFrame(list(rows(branch)), columns=columns(branch))
-
-
-def _write(path: str | PathLike[str], header: list[str], body: Iterator[list[Any]]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")  # writes floats by repr, so that they read back to the last bit
-    writer.writerow(header)
-    writer.writerows(body)
-    with replace_file(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")

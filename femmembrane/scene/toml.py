@@ -98,7 +98,7 @@ def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
     InputError
         When the file cannot be read or is no TOML (with the line).
     """
-    from ..results.files import read_bytes
+    from ..files import read_bytes
 
     path = Path(path)
     try:

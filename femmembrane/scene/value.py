@@ -236,7 +236,7 @@ class Scene:
         """
         import tomli_w
 
-        from ..results.store import replace_file
+        from ..files import replace_file
 
         text = tomli_w.dumps(self.to_dict())
         with replace_file(path) as temporary:

@@ -15,13 +15,14 @@ from ..checks import choice, whole
 from ..discretization.space import Space
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
+from ..results.verdict import Verdict
 from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, least_stress
 from ..threads import one_thread
 from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
 from .mode_resolution import unresolved
 from .second_variation import PAIRS
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
-from .verdict import Verdict, against, short_wave_verdict, verdict_from
+from .verdict import against, short_wave_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
 
 

@@ -11,12 +11,13 @@ import numpy as np
 from ..checks import whole
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
+from ..results.verdict import Verdict
 from ..scene import MAX_WAVES
 from ..solve.finer_space import counterpart, transferred
 from .azimuthal import azimuthal_verdict
 from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError
-from .verdict import CONTROLS, Verdict, against, axisymmetric_verdict, in_words
+from .verdict import CONTROLS, against, axisymmetric_verdict, in_words
 from .wave_unknowns import mode_in
 
 #: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once

@@ -12,63 +12,16 @@ an eigenvalue near zero is to be believed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import partial
-
-import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
+from ..results.vibration import Vibration
 from ..solve.wellposed import ill_posed
 from .azimuthal import lowest_eigenvalues, short_waves
 from .azimuthal_operator import azimuthal_operator
 from .spectrum import SpectrumError
 from .wave_unknowns import azimuthal_shape
-
-
-@dataclass(frozen=True, eq=False)
-class Vibration:
-    """One natural mode of an equilibrium.
-
-    Attributes
-    ----------
-    eigenvalue : float
-        lambda of K phi = lambda M phi, in units of mu/(rho_m R0^2) with rho_m the mass density.
-    error : float
-        Bound on the algebraic error of the eigenvalue.
-    azimuthal : int
-        Number of waves around the axis.
-    control : str or None
-        "pressure" or "volume", what is held during the motion; None for azimuthal modes, which do not change the volume.
-    coefficients : ndarray
-        Of the mode on the free degrees of freedom, normalised in the mass of the reference area, the largest one positive.
-    """
-
-    eigenvalue: float
-    error: float
-    azimuthal: int
-    control: str | None
-    coefficients: Array = field(repr=False)
-    _shape: Callable[[Array], Mapping[str, Array]] = field(repr=False)
-
-    @property
-    def omega(self) -> float:
-        """Angular frequency in units of sqrt(mu/(rho_m R0^2)), the imaginary part of s: 0 in an unstable direction, which departs."""
-        return float(np.sqrt(max(self.eigenvalue, 0.0)))
-
-    @property
-    def growth_rate(self) -> float:
-        """Rate of departure in the units of omega, the real part of s: 0 where the membrane oscillates."""
-        return float(np.sqrt(max(-self.eigenvalue, 0.0)))
-
-    @property
-    def mode(self) -> Mapping[str, Array]:
-        """The shape at the nodes: r (reference radius), u, w, and c around the axis for azimuthal modes.
-
-        The displacement at the angle theta is (u cos(n theta), c sin(n theta), w cos(n theta)) in (e_rho, e_theta, e_z).
-        """
-        return self._shape(self.coefficients)
 
 
 def natural_frequencies(

@@ -18,16 +18,17 @@ which vanishes where the membrane stops being taut, as the stress of the plain m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import overload
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..checks import choice
 from ..discretization.space import Space, space_of_scene
 from ..potential import potential_of
+from ..results.records import Branch, Equilibrium
+from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
 from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
@@ -35,8 +36,6 @@ from .profile import Profile, profile_at
 
 Array = NDArray[np.float64]
 
-#: kinds of zones; the place of each is its number, the sum of _BITS of what is compressive
-KINDS = ("taut", "radial", "circumferential", "double")
 #: what compressive s_11 and s_22 add to the number of a kind
 _BITS = (2, 1)
 #: points at which the signs are looked at in each element, both ends included
@@ -48,102 +47,11 @@ _WIDE = 4
 #: zones shorter than this part of the meridian are round-off of a border
 _SLIVER = 1e-10
 
+#: how often the way between two equilibria is halved to see where the kinds of zones change
+_HALVINGS = 10
+
 #: parameters of the meridian to the two stresses whose signs decide
 _Stresses = Callable[[Array], tuple[Array, Array]]
-
-
-@dataclass(frozen=True)
-class Zone:
-    """A part of the membrane between two circles with the same signs of the principal stresses.
-
-    Attributes
-    ----------
-    kind : {"taut", "radial", "circumferential", "double"}
-    r, rho : (float, float)
-        Reference and deformed radii over R0 at its start and end, seen from the pole.
-    area_fraction, deformed_area_fraction : float
-        Its part of the reference and of the deformed area.
-    s : (float, float)
-        Parameters of the meridian at its start and end; those of a disc are the reference radii.
-    """
-
-    kind: str
-    r: tuple[float, float]
-    rho: tuple[float, float]
-    area_fraction: float
-    deformed_area_fraction: float
-    s: tuple[float, float] = field(repr=False)
-
-    def __str__(self) -> str:
-        (r0, r1), (rho0, rho1) = self.r, self.rho
-        where = f"r = {r0:<7.4g} to {r1:<7.4g} rho = {rho0:<7.4g} to {rho1:<7.4g}"
-        return f"{self.kind:<16}{where}{self.area_fraction:>8.2%} of the area ({self.deformed_area_fraction:.2%} deformed)"
-
-
-@dataclass(frozen=True)
-class Zones(Sequence[Zone]):
-    """The zones of an equilibrium, from the pole to the rim; together they are the whole membrane.
-
-    Attributes
-    ----------
-    criterion : {"total", "mechanical"}
-        The stresses that decide.
-    zones : tuple of Zone
-        One or more; neighbours are of different kinds.
-    """
-
-    criterion: str
-    zones: tuple[Zone, ...]
-
-    def __len__(self) -> int:
-        return len(self.zones)
-
-    @overload
-    def __getitem__(self, index: int) -> Zone: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Zone, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> Zone | tuple[Zone, ...]:
-        return self.zones[index]
-
-    def __iter__(self) -> Iterator[Zone]:
-        return iter(self.zones)
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """Kind of each zone."""
-        return tuple(zone.kind for zone in self)
-
-    @property
-    def borders(self) -> tuple[float, ...]:
-        """Reference radii at which one zone ends and the next begins."""
-        return tuple(zone.r[1] for zone in self.zones[:-1])
-
-    def fraction(self, kind: str) -> float:
-        """Part of the reference area that is of a kind.
-
-        Raises
-        ------
-        InputError
-            For an unknown kind.
-        """
-        choice("kind", kind, KINDS)
-        return float(sum(zone.area_fraction for zone in self if zone.kind == kind))
-
-    def numbers(self, s: ArrayLike) -> NDArray[np.int64]:
-        """Kinds at parameters s of the meridian, as their places in KINDS (0 taut ... 3 double); a border is of the zone outside it."""
-        kinds = np.array([KINDS.index(kind) for kind in self.kinds])
-        return kinds[np.searchsorted([zone.s[1] for zone in self.zones[:-1]], s, side="right")]
-
-    @property
-    def summary(self) -> str:
-        """In a few words: taut, or each kind of wrinkles with its part of the reference area."""
-        found = [f"{kind} {100 * self.fraction(kind):.3g}%" for kind in KINDS[1:] if kind in self.kinds]
-        return ", ".join(found) or "taut"
-
-    def __str__(self) -> str:
-        return "\n".join([f"zones by the signs of the {self.criterion} stresses", *(f"  {zone}" for zone in self)])
 
 
 def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones:
@@ -179,6 +87,34 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
     r, rho, s = (list(zip(v[:-1].tolist(), v[1:].tolist(), strict=True)) for v in (ends.r, ends.rho, edges))
     parts = zip(codes, r, rho, area.tolist(), deformed.tolist(), s, strict=True)
     return Zones(criterion, tuple(Zone(KINDS[code], *rest) for code, *rest in parts))
+
+
+def zones_along(branch: Branch) -> ZonesAlong:
+    """The zones of all equilibria of a branch and, where their kinds change, of states between two of them."""
+    landings = {id(jump.landing) for jump in branch.jumps}
+    steps, zones, snaps = [0.0], [branch[0].zones()], set()
+    for k, (a, b) in enumerate(pairwise(branch)):
+        if id(b) in landings:
+            snaps.add(len(zones))
+        else:
+            for t, between in _changing(a, b, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS):
+                steps.append(k + t)
+                zones.append(between)
+        steps.append(k + 1.0)
+        zones.append(b.zones())
+    return ZonesAlong(np.array(steps), tuple(zones), frozenset(snaps))
+
+
+def _changing(
+    a: Equilibrium, b: Equilibrium, first: tuple[float, Zones], last: tuple[float, Zones], halvings: int
+) -> list[tuple[float, Zones]]:
+    """Zones of states on the straight line from a to b, closer and closer to where their kinds change; each with its part of the way."""
+    if first[1].kinds == last[1].kinds or not halvings:
+        return []
+    t = (first[0] + last[0]) / 2
+    state, pressure = (1 - t) * a.state + t * b.state, (1 - t) * a.pressure + t * b.pressure
+    middle = t, find_zones(a.scene, state, pressure, first[1].criterion)
+    return [*_changing(a, b, first, middle, halvings - 1), middle, *_changing(a, b, middle, last, halvings - 1)]
 
 
 def _deciding(scene: Scene, x: Array, pressure: float, criterion: str) -> _Stresses:

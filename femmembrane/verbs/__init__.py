@@ -7,7 +7,6 @@ from .follow import equilibrium as equilibrium
 from .follow import inflate as inflate
 from .follow import pressurize as pressurize
 from .follow import run as run
-from .search import Equilibria as Equilibria
 from .search import equilibria as equilibria
 from .trace import trace as trace
 from .trace import trace_iter as trace_iter

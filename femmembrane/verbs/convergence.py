@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, HEADINGS, PROFILES, ROUND_OFF, Convergence, profile_norms
+from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, profile_norms
 from ..checks import only, switch
 from ..errors import SolveError, Status
 from ..potential import Array, potential_of
+from ..results.convergence import HEADINGS, PROFILES, ROUND_OFF, Convergence
 from ..results.records import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CONTROLS, Control, control_kind

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import platform
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..accuracy import cost as work
-from ..accuracy.cost import Course, Job, Measurement, Outcome, Reference
+from ..accuracy.cost import Course, Job, Outcome
 from ..accuracy.strong_form import StrongForm, prescribed
 from ..checks import is_number, is_whole
 from ..errors import InputError, SolveError, unknown_name
 from ..kernels import kernels
+from ..origin import NOTED_VERSIONS, package_version, processor
 from ..potential import potential_of
-from ..results.origin import NOTED_VERSIONS, processor
+from ..results.cost import STARTS, Cost, Measurement
 from ..results.records import Branch, Equilibrium
-from ..results.store import package_version, replace_file, save
+from ..results.store import save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene
 from ..solve.banded import BandFactor, BorderedFactor
@@ -37,16 +36,6 @@ from ..threads import one_thread
 from .arguments import check_scene
 from .state_records import record
 
-#: columns of the table, and the machine with every line so that a table can stand alone
-COLUMNS = (*(f.name for f in fields(Measurement)), "machine")
-
-_TITLES = {
-    "newton": "finite elements, Newton",
-    "ipopt": "finite elements, IPOPT",
-    "shooting": "shooting, Newton",
-    "collocation": "collocation",
-    "published": "shooting as published",
-}
 #: arguments of a study that takes seconds
 QUICK: Mapping[str, Any] = {
     "degrees": (1, 2, 6),
@@ -56,87 +45,6 @@ QUICK: Mapping[str, Any] = {
     "budget": 0.2,
     "reference_elements": 32,
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Cost:
-    """What :func:`cost` measured.
-
-    Attributes
-    ----------
-    scene : Scene
-    control : str
-        volume, pressure or center_height.
-    load : float
-    quantity : str
-        pressure, or under pressure control volume: whose relative error is measured.
-    reference : Reference
-        What errors are measured against, and its own error.
-    lines : tuple of Measurement
-    machine : mapping of str to str
-        Processor, number of processors, system and versions.
-    """
-
-    scene: Scene
-    control: str
-    load: float
-    quantity: str
-    reference: Reference
-    lines: tuple[Measurement, ...] = field(repr=False)
-    machine: Mapping[str, str] = field(repr=False)
-
-    def select(self, **having: Any) -> tuple[Measurement, ...]:
-        """The lines with these attributes (``what="solve", method="newton", start="warm"``).
-
-        Raises
-        ------
-        InputError
-            For an attribute that a line does not have.
-        """
-        for name in having:
-            if name not in COLUMNS[:-1]:
-                raise unknown_name("select", name, COLUMNS[:-1])
-        return tuple(line for line in self.lines if all(getattr(line, name) == value for name, value in having.items()))
-
-    @property
-    def front(self) -> tuple[Measurement, ...]:
-        """The solves that no other one with the same start beats in both time and error, warm ones first, the fastest first."""
-        return tuple(
-            sorted((line for line in self.lines if line.front), key=lambda line: (work.STARTS.index(line.start), line.milliseconds))
-        )
-
-    def __str__(self) -> str:
-        return "\n".join(_text(self))
-
-    def to_dataframe(self) -> Any:
-        """All lines as a pandas DataFrame with the columns :data:`COLUMNS`."""
-        import pandas
-
-        return pandas.DataFrame(list(self._rows()), columns=list(COLUMNS))
-
-    def write_csv(self, path: str | PathLike[str]) -> None:
-        """Write all lines under a header, whole or not at all; what does not apply is left empty.
-
-        Raises
-        ------
-        InputError
-            When the folder does not exist or cannot be written to.
-        """
-        with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows([["" if _absent(value) else value for value in row] for row in self._rows()])
-
-    def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Error against milliseconds as a Matplotlib figure, also written to ``path`` if given."""
-        from ..views.cost import plot_cost
-
-        return plot_cost(self, path)
-
-    def _rows(self) -> Iterator[list[Any]]:
-        machine = ", ".join(self.machine.values())
-        for line in self.lines:
-            yield [*asdict(line).values(), machine]
 
 
 @one_thread
@@ -149,7 +57,7 @@ def cost(
     degrees: Sequence[int] = (1, 2, 4, 6, 8),
     elements: Sequence[int] = (4, 8, 16, 32, 64, 128),
     solvers: Sequence[str] = ("newton", "ipopt"),
-    starts: Sequence[str] = work.STARTS,
+    starts: Sequence[str] = STARTS,
     methods: Sequence[str] | None = None,
     tolerances: Mapping[str, Sequence[float]] = work.TOLERANCES,
     repeat: int = 5,
@@ -215,7 +123,7 @@ def cost(
     _whole("repeat", [repeat])
     _whole("reference_elements", [reference_elements])
     _known("solvers", solvers, work.SOLVERS)
-    _known("starts", starts, work.STARTS)
+    _known("starts", starts, STARTS)
     _known("methods", methods or (), work.METHODS)
     for key, value, least in (("budget", budget, 0.0), ("step", 1.0 if step is None else step, np.nextafter(0, 1))):
         if not (is_number(value) and value >= least):
@@ -324,9 +232,6 @@ def _stages(course: Course) -> list[Job]:
 
 def _outputs(course: Course, folder: Path) -> list[Job]:
     """What one equilibrium leaves behind, by file."""
-    from ..views.plots import plot_pressure_volume
-    from ..views.vtk import write_vtk
-
     scene = course.scene.replace(analysis=Analysis())
     potential = potential_of(scene)
     equilibrium = record(scene, potential, course.step(potential)("newton", potential))
@@ -334,8 +239,8 @@ def _outputs(course: Course, folder: Path) -> list[Job]:
     outputs: dict[str, Callable[[], Any]] = {
         "output, table": lambda: write_csv(branch, folder / "branch.csv"),
         "output, NetCDF": lambda: save(branch, folder / "branch.nc"),
-        "output, VTU": lambda: write_vtk(branch, folder / "membrane.pvd"),
-        "output, picture": lambda: plot_pressure_volume(branch, folder / "pressure-volume.png"),
+        "output, VTU": lambda: branch.to_vtk(folder / "membrane.pvd"),
+        "output, picture": lambda: branch.plot(folder / "pressure-volume.png"),
     }
     line = Measurement("stage", "", "", scene.degree, potential.space.n_elements, potential.space.n_free)
     return [_job(line, name, act) for name, act in outputs.items()]
@@ -387,65 +292,3 @@ def _recorded(course: Course, scene: Scene) -> Callable[[], Outcome]:
 
 
 # --- the table as text
-
-
-def _absent(value: Any) -> bool:
-    return value is None or (isinstance(value, float) and np.isnan(value))
-
-
-def _number(value: Any, form: str, width: int) -> str:
-    return " " * (width - 1) + "-" if _absent(value) else f"{value:{width}{form}}"
-
-
-def _text(study: Cost) -> Iterator[str]:
-    letter = "V" if study.quantity == "volume" else "P"
-    reference = study.reference
-    at = f"{CONTROLS[study.control].symbol} = {study.load:.9g}"
-    yield f"One equilibrium at {at}: relative error in {letter} and milliseconds (* nothing is better in both)"
-    yield (
-        f"reference: {letter} = {reference.value:.15g}, {reference.elements} elements of degree {reference.degree}, "
-        f"own error {reference.error:.1g}"
-    )
-    yield ", ".join(study.machine.values())
-    yield from _element_table(study, letter)
-    yield from _method_table(study, letter)
-    stages, effects = study.select(what="stage"), study.select(what="effect")
-    if stages:
-        yield f"\n{'parts, on ' + str(stages[0].elements) + ' elements of degree ' + str(stages[0].degree):<54} {'ms':>9}"
-        yield from (f"  {line.method:<52} {line.milliseconds:>9.3f}" for line in stages)
-    if effects:
-        yield f"\n{'one load step (Newton iterations)':<44} {'off ms':>14} {'on ms':>14}"
-        for off, on in zip(effects[::2], effects[1::2], strict=True):
-            times = (f"{line.milliseconds:9.3f} ({line.iterations:>2})" if line.converged else f"{'-':>14}" for line in (off, on))
-            yield f"  {off.method:<42} {' '.join(times)}"
-
-
-def _element_table(study: Cost, letter: str) -> Iterator[str]:
-    lines = study.select(what="solve")
-    kinds = list(dict.fromkeys((line.method, line.start) for line in lines if line.degree))
-    meshes = list(dict.fromkeys((line.degree, line.elements, line.unknowns) for line in lines if line.degree))
-    if not meshes:
-        return
-    heads = "".join(f"{method + ' ' + start:>14}" for method, start in kinds)
-    builds = list(dict.fromkeys(method for method, _ in kinds))
-    yield f"\ndegree elements unknowns {'error in ' + letter:>10}{heads}" + "".join(f"{'set-up ' + b:>15}" for b in builds)
-    for degree, n, unknowns in meshes:
-        own = {(line.method, line.start): line for line in lines if (line.degree, line.elements) == (degree, n)}
-        error = next((line.error for line in own.values() if line.converged), None)
-        times = "".join(_number(own[k].milliseconds, ".2f", 12) + (" *" if own[k].front else "  ") for k in kinds)
-        setups = [
-            next((own[k].setup_milliseconds for k in kinds if k[0] == b and not _absent(own[k].setup_milliseconds)), None) for b in builds
-        ]
-        yield f"{degree:>6} {n:>8} {unknowns:>8} {_number(error, '.1e', 10)}{times}" + "".join(_number(t, ".1f", 15) for t in setups)
-
-
-def _method_table(study: Cost, letter: str) -> Iterator[str]:
-    lines = [line for line in study.select(what="solve") if line.degree is None]
-    if lines:
-        yield f"\n{'method':<24} tolerance {'error in ' + letter:>10} {'ms':>12} {'iterations':>12} {'right-hand sides':>17}"
-    for line in lines:
-        time_ = _number(line.milliseconds, ".2f", 12) + (" *" if line.front else "  ")
-        yield (
-            f"{_TITLES[line.method]:<24} {line.tolerance:>9.0e} {_number(line.error, '.1e', 10)} {time_} {line.iterations:>10} "
-            f"{line.evaluations:>17}" + ("" if line.converged else f"  {line.message}")
-        )

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import re
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from os import PathLike
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..checks import sign
 from ..errors import InputError, SolveError, Status
-from ..potential import Evaluation, Family, Potential, potential_of
+from ..potential import Array, Evaluation, Family, Potential, potential_of
+from ..results.folds import Cusp, FoldCurve
 from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
 from ..scene.variation import Parameter
@@ -27,133 +24,10 @@ from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
 from .state_records import record
 
-Array = NDArray[np.float64]
-
 #: rate of the fold's own quantity along the curve below which it counts as stationary too: two folds of this kind merge there
 _STATIONARY = 1e-6
 #: shorter steps than the corrector needs, so that a line through the points is a fair picture of the curve
 _STEPS = StepControl(largest=0.1)
-
-_FOLD_NAMES = {"limit_point": "limit point (dP = 0)", "volume_fold": "volume fold (dV = 0)"}
-_LABELS = (
-    (r"source\.(\d+)\.strength", "dipole strength M = μ₀D²/(R₀⁶μ)"),
-    (r"source\.(\d+)\.height", "height of the source h/R₀"),
-    (r"membrane\.susceptibility", "susceptibility χ"),
-    (r"material\.mu\.(\d+)", "modulus of term {0} over the shear modulus, μ{0}/μ"),
-    (r"material\.alpha\.(\d+)", "exponent of term {0}, α{0}"),  # noqa: RUF001
-)
-
-
-@dataclass(frozen=True, eq=False)
-class Cusp(SpecialPoint):
-    """A point of a fold curve where the number is stationary along the curve, solved as an equation.
-
-    Attributes
-    ----------
-    kind : str
-        ``cusp``: two folds of the kind followed merge; on one side of ``value`` there are both, on the other none. ``branch_point``: a
-        limit point meets a volume fold, and branches of equilibria meet or separate.
-    value : float
-        The number there; its error is of second order in ``error``.
-    """
-
-    value: float = field(kw_only=True)
-
-
-@dataclass(frozen=True, eq=False)
-class FoldCurve:
-    """A fold followed in one number of the scene.
-
-    Attributes
-    ----------
-    kind : str
-        limit_point (dP = 0) or volume_fold (dV = 0).
-    parameter : str
-        Name of the number, as given.
-    values, pressure, volume, center_height : ndarray, shape (len(curve),)
-        The number, and the fold at it, in the order of the curve.
-    cusps : tuple of Cusp
-        Where the curve turns in the number.
-    equilibria : tuple of Equilibrium
-        The folds as equilibria, each of its own scene.
-    closed : bool
-        Whether the curve came back to its first point, which is then also the last.
-    status : Status
-        How the curve ended; with a ``message`` unless a bound was met or the curve closed.
-    timings : mapping of str to float
-        Seconds by stage.
-    """
-
-    kind: str
-    parameter: str
-    values: Array
-    pressure: Array
-    volume: Array
-    center_height: Array
-    cusps: tuple[Cusp, ...]
-    equilibria: tuple[Equilibrium, ...] = field(repr=False)
-    closed: bool = False
-    status: Status = Status.CONVERGED
-    message: str = ""
-    timings: Mapping[str, float] = field(default_factory=dict, repr=False)
-
-    def __len__(self) -> int:
-        return len(self.equilibria)
-
-    def __str__(self) -> str:
-        width = max(14, len(self.parameter))
-        lines = [_FOLD_NAMES[self.kind], f"{self.parameter:>{width}} {'pressure':>14} {'volume':>14} {'pole height':>14}"]
-        rows = zip(self.values, self.pressure, self.volume, self.center_height, strict=True)
-        lines += [f"{m:>{width}.8g} {p:>14.9g} {v:>14.9g} {w:>14.9g}" for m, p, v, w in rows]
-        for c in self.cusps:
-            lines.append(f"{c.kind.replace('_', ' ')} at {self.parameter} = {c.value:.10g}: P = {c.pressure:.9g}, V = {c.volume:.9g}")
-        return "\n".join(lines + ([self.message] if self.message else []))
-
-    def to_dataframe(self) -> Any:
-        """The curve as a pandas DataFrame: a column named like the parameter, then pressure, volume and center_height."""
-        import pandas
-
-        return pandas.DataFrame(
-            {self.parameter: self.values, "pressure": self.pressure, "volume": self.volume, "center_height": self.center_height}
-        )
-
-    def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Pressure and volume of the fold against the number as a Matplotlib figure, also written to ``path`` if given."""
-        from ..results.store import replace_file
-        from ..views.backend import drawing, load, title_text
-
-        load()
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(6.4, 6.0), layout="constrained")
-        FigureCanvasAgg(figure)
-        panels = figure.subplots(2, 1, sharex=True)
-        title = self.equilibria[0].scene.title if self.equilibria else ""
-        heading = title_text(title) or _FOLD_NAMES[self.kind][0].upper() + _FOLD_NAMES[self.kind][1:]
-        figure.suptitle(heading, fontsize=11, wrap=True, parse_math=False)
-        labels = {"pressure": "pressure at the fold P = pR₀/(μT)", "volume": "volume at the fold V/R₀³"}
-        for axes, (name, label) in zip(panels, labels.items(), strict=True):
-            self._draw(axes, name)
-            axes.set_ylabel(label)
-        panels[-1].set_xlabel(_label(self.parameter))
-        panels[0].legend(fontsize=9, framealpha=0.9, edgecolor="none")
-        if path is not None:
-            with replace_file(path) as temporary, drawing():
-                figure.savefig(temporary, dpi=160)
-        return figure
-
-    def _draw(self, axes: Any, name: str) -> None:
-        axes.plot(self.values, getattr(self, name), "-", color="#0072b2", linewidth=1.8, zorder=2, label=_FOLD_NAMES[self.kind])
-        axes.plot(self.values, getattr(self, name), ".", color="#0072b2", markersize=4, zorder=2)
-        markers = {"cusp": ("D", "cusp: two of them merge"), "branch_point": ("s", "branch point: limit point meets volume fold")}
-        for kind, (marker, label) in markers.items():
-            places = np.array([[c.value, getattr(c, name)] for c in self.cusps if c.kind == kind]).reshape(-1, 2)
-            if len(places):
-                look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "zorder": 3}
-                axes.plot(*places.T, marker, label=label, **look)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(color="0.9", linewidth=0.6)
 
 
 @one_thread
@@ -363,11 +237,3 @@ def _check_start(start: SpecialPoint, family: Family) -> None:
         raise InputError("start", start.kind, "a special point of kind " + " or ".join(KINDS) + " is allowed")
     if start.equilibrium.state.shape != (family.space.n_free,):
         raise InputError("start", start, f"a point with {family.space.n_free} unknowns (the same mesh and degree) is allowed")
-
-
-def _label(parameter: str) -> str:
-    for pattern, label in _LABELS:
-        match = re.fullmatch(pattern, parameter)
-        if match:
-            return label.format(*(str(int(k) + 1) if "term" in label else k for k in match.groups()))
-    return parameter

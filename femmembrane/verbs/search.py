@@ -2,58 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from ..checks import number, only
 from ..potential import potential_of
-from ..results.records import Equilibrium
+from ..results.equilibria import Equilibria
 from ..scene import Scene
 from ..solve.search import Search
 from ..threads import one_thread
 from .arguments import check_max_steps, check_scene
 from .state_records import record
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibria(Sequence[Equilibrium]):
-    """Equilibria at one load, by increasing energy (E under volume control, E - P V under pressure control).
-
-    Attributes
-    ----------
-    control : {"volume", "pressure"}
-    load : float
-    found : tuple of Equilibrium
-    energies : tuple of float
-        The energy that orders them.
-    searched : str
-        What was done to find them: a search never proves that there are no more.
-    """
-
-    control: str
-    load: float
-    found: tuple[Equilibrium, ...] = field(repr=False)
-    energies: tuple[float, ...]
-    searched: str
-
-    def __len__(self) -> int:
-        return len(self.found)
-
-    def __getitem__(self, index):  # type: ignore[no-untyped-def]  # the overloads of Sequence
-        return self.found[index]
-
-    def __iter__(self) -> Iterator[Equilibrium]:
-        return iter(self.found)
-
-    def __str__(self) -> str:
-        lines = [f"{len(self)} equilibria at {self.control} {self.load:.9g}; {self.searched}"]
-        lines.append(f"{'energy':>14} {'volume':>12} {'pressure':>12} {'pole height':>12}  {'under pressure':<14}  {'under volume':<14}")
-        for energy, eq in zip(self.energies, self.found, strict=True):
-            words = f"{eq.verdict('pressure').word:<14}  {eq.verdict('volume').word:<14}"
-            lines.append(f"{energy:>14.8g} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}  {words}".rstrip())
-        return "\n".join(lines)
 
 
 @one_thread

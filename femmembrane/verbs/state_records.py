@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
 from ..results.records import Branch, Equilibrium, PathMemory, SpecialPoint
+from ..results.verdict import Verdict
 from ..scene import Scene
 from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import RESIDUAL, correct, relative_residual
@@ -17,7 +18,6 @@ from ..solve.special_points import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
 from ..stability.checked_verdict import checked_verdict
-from ..stability.verdict import Verdict
 
 OnStep = Callable[[int, int, Equilibrium], None]
 #: called after each step with the branch so far, from which the run can be resumed

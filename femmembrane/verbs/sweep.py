@@ -7,9 +7,9 @@ import itertools
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,15 +21,16 @@ from ..discretization.meridian import side
 from ..errors import InputError
 from ..memory import require
 from ..results.finished_scenes import FinishedScenes
-from ..results.grid import MEANING, dataset_of, load_dataset, save_dataset
+from ..results.grid import MEANING, dataset_of
 from ..results.store import scene_text
+from ..results.sweep import Plan, Sweep
 from ..scene import Scene
 from ..scene.keys import MAX_SCENES, set_key
 from . import parallel
 from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
 
 if TYPE_CHECKING:
-    import xarray
+    pass
 
 #: called with the number of scenes that are done, all there are, and those of the done ones without a result
 OnScene = Callable[[int, int, int], None]
@@ -39,118 +40,6 @@ KEPT = "scenes.sqlite"
 _ALONE = 2.0
 #: scenes that are timed for an estimate
 _SAMPLE = 4
-
-
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """What came of every scene of a grid.
-
-    Attributes
-    ----------
-    scene : Scene
-        The one whose keys were changed.
-    over : mapping of str to tuple
-        The values of each key.
-    quantity : str
-    """
-
-    scene: Scene
-    over: Mapping[str, tuple[Any, ...]]
-    quantity: str
-    _dataset: xarray.Dataset = field(repr=False)
-
-    def __len__(self) -> int:
-        return math.prod(len(values) for values in self.over.values())
-
-    def __str__(self) -> str:
-        keys = ", ".join(f"{key} ({len(values)} values)" for key, values in self.over.items())
-        statuses, counts = np.unique(self._dataset["status"].values, return_counts=True)
-        lines = [f"{len(self)} scenes over {keys}: {self.quantity}"]
-        return "\n".join(lines + [f"{count:>8} {status}" for status, count in zip(statuses, counts, strict=True)])
-
-    @property
-    def failed(self) -> int:
-        """Number of scenes without a result; the reasons are in ``status`` and ``message``."""
-        return int((~self._dataset["has_result"].values).sum())
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Everything as one data set, whose dimensions are the keys; ``status`` and ``message`` say how each scene ended."""
-        return self._dataset.copy()
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the data set to a NetCDF file, whole or not at all."""
-        save_dataset(self._dataset, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> Sweep:
-        """Bring a saved sweep back.
-
-        Raises
-        ------
-        InputError
-            When the file is no sweep.
-        """
-        from ..results.store import scene_from_text
-
-        dataset = load_dataset(path)
-        over = {key: tuple(dataset[key].values.tolist()) for key in json.loads(dataset.attrs["over"])}
-        try:
-            scene = scene_from_text(dataset.attrs["scene"])
-        except (ValueError, RecursionError) as error:
-            raise InputError("path", str(path), f"a sweep written by femmembrane is needed ({error})") from None
-        return cls(scene, over, dataset.attrs["quantity"], dataset)
-
-    def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None) -> Any:
-        """Maps over two keys, or curves over one, as a Matplotlib figure, also written to ``path`` if given.
-
-        Parameters
-        ----------
-        show : sequence of str, optional
-            Variables of the data set; one with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
-            most telling ones of the quantity.
-
-        Raises
-        ------
-        InputError
-            For an unknown variable, for three keys or more, or a file that cannot be written.
-        """
-        from ..views.grid import plot_grid
-
-        return plot_grid(self, path, show)
-
-
-@dataclass(frozen=True)
-class Plan:
-    """How long a sweep will take.
-
-    Attributes
-    ----------
-    scenes, kept : int
-        Different scenes of the grid, and those of them that are finished already.
-    seconds_each : float
-        Mean wall time of the scenes that were timed; 0 if none is left.
-    timed, workers : int
-        How many were timed, and how many processes share the work.
-    """
-
-    scenes: int
-    kept: int
-    seconds_each: float
-    timed: int
-    workers: int
-
-    @property
-    def seconds(self) -> float:
-        """Expected wall time of what is left."""
-        return (self.scenes - self.kept) * self.seconds_each / self.workers
-
-    def __str__(self) -> str:
-        left = self.scenes - self.kept
-        text = f"{self.scenes} scenes, {self.kept} of them finished"
-        if not left:
-            return f"{text}: nothing to compute"
-        each = f"{1e3 * self.seconds_each:.3g} ms a scene (mean of {self.timed})"
-        return f"{text}; {each}: about {self.seconds:.3g} s for the other {left} on {self.workers} process(es)"
 
 
 def sweep(

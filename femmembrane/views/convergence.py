@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accuracy.convergence import RESOLVED, Convergence
 from ..errors import unknown_name
+from ..results.convergence import RESOLVED, Convergence
 from .plots import new_figure, save_figure
 
 if TYPE_CHECKING:

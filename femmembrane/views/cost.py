@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..accuracy.cost import Measurement
-    from ..verbs.cost import Cost
+    from ..results.cost import Cost, Measurement
 
 _HEADINGS = {"warm": "a neighbouring state is known (next load step)", "cold": "cold start"}
 #: marker of each degree and its shade on a map whose lightness falls, so that they differ in grey as well

@@ -17,19 +17,17 @@ Lengths are in units of R0, or in m where the scene has scales (in .csv then bot
 
 from __future__ import annotations
 
-import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..results.files import remove_leftovers
-from ..results.store import replace_file
+from ..files import remove_leftovers, replace_file, write_csv
 from .surroundings import place_of
 from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
@@ -89,22 +87,20 @@ def check_format(suffix: str) -> None:
 
 def _write_csv(shown: Sequence[tuple[int, Equilibrium]], path: Path) -> list[Path]:
     """One line a node: step, loads, and the profile."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     names = [name for name in ("r", "rho", "eta", *FIELDS) if name in shown[0][1].profile()]
     scales = shown[0][1].scene.scales
     in_m = [] if scales is None else [name for name in ("r", "rho", "eta") if name in names]
-    writer.writerow(["step", "volume", "pressure", *names, *(f"{name}_m" for name in in_m)])
-    for number, equilibrium in shown:
-        profile = dict(equilibrium.profile())
-        if scales is not None:
-            profile |= {f"{name}_m": scales.to_si("length", profile[name]) for name in in_m}
-        loads = [number, equilibrium.volume, equilibrium.pressure]
-        writer.writerows(
-            [*loads, *row] for row in zip(*(profile[name].tolist() for name in [*names, *(f"{name}_m" for name in in_m)]), strict=True)
-        )
-    with replace_file(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    columns = [*names, *(f"{name}_m" for name in in_m)]
+
+    def rows() -> Iterator[list[Any]]:
+        for number, equilibrium in shown:
+            profile = dict(equilibrium.profile())
+            if scales is not None:
+                profile |= {f"{name}_m": scales.to_si("length", profile[name]) for name in in_m}
+            for node in zip(*(profile[name].tolist() for name in columns), strict=True):
+                yield [number, equilibrium.volume, equilibrium.pressure, *node]
+
+    write_csv(path, ["step", "volume", "pressure", *columns], rows())
     return [path]
 
 

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
 from ..results.grid import MEANING
+from ..results.quantities import PLACES, QUANTITIES
 from .backend import title_text
-from .plots import HEIGHT_LABEL, PRESSURE_LABEL, VOLUME_LABEL, new_figure, save_figure
+from .plots import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..verbs.sweep import Sweep
+    from ..results.sweep import Sweep
 
 Array = NDArray[Any]
 
@@ -40,7 +41,6 @@ _KEYS = {
     "run.start": "first load",
     "run.stop": "last load",
 }
-_PLACES = {"volume": VOLUME_LABEL, "pressure": PRESSURE_LABEL, "center_height": HEIGHT_LABEL}
 _LABELS = {
     "limit_points": "number of limit points",
     "equilibria": "number of equilibria",
@@ -116,11 +116,11 @@ def _label(name: str) -> str:
     variable, _, place = name.partition(".")
     if variable in _LABELS:
         return _LABELS[variable]
-    tag, _, quantity = ("", "", variable) if variable in _PLACES else variable.partition("_")
-    if quantity not in _PLACES:
+    tag, _, quantity = ("", "", variable) if variable in PLACES else variable.partition("_")
+    if quantity not in PLACES:
         return MEANING[variable][1]
     what = {"": "step", "limit": "limit point", "fold": "volume fold", "onset": "onset", "state": "equilibrium"}[tag]
-    return f"{what}{f' {int(place) + 1}' if place else ''}: {_PLACES[quantity]}"
+    return f"{what}{f' {int(place) + 1}' if place else ''}: {QUANTITIES[quantity].label}"
 
 
 def _key_label(key: str) -> str:

@@ -8,19 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..results.quantities import heading
+
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
 
 #: most rows of a table of equilibria
 MOST_ROWS = 60
-#: headings of the columns of a branch
-HEADINGS = {
-    "volume": "V",
-    "pressure": "P",
-    "center_height": "pole height",
-    "elastic_energy": "elastic energy",
-    "magnetic_energy": "magnetic energy",
-}
 
 
 def text(value: Any) -> str:
@@ -59,7 +53,7 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
     held, _ = estimated(branch.scene)
     shown = {round(step) for step in np.linspace(0, len(branch) - 1, min(most, len(branch)))}
     cells = [[value(branch[step], step, name, held) for name in names] for step in sorted(shown)]
-    return [HEADINGS.get(name, name.replace("_", " ")) for name in names], cells
+    return [heading(name) for name in names], cells
 
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..checks import number, whole
 from ..errors import InputError
-from ..results.store import replace_file
-from ..stability.verdict import Verdict
+from ..files import replace_file
+from ..results.verdict import Verdict
 from ..threads import cached_property
 from .picture import aim, circles, new_plotter, polydata
 from .surroundings import Box
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pyvista
 
     from ..results.records import Equilibrium
-    from ..stability.frequencies import Vibration
+    from ..results.vibration import Vibration
 
 #: largest displacement that is shown unless an amplitude is given, relative to half the size of the membrane
 SHOWN = 0.15

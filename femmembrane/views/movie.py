@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..results.store import replace_file
+from ..files import replace_file
 
 #: a frame: height, width, colour
 Frame = NDArray[np.uint8]

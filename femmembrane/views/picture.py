@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
-from ..results.store import MEANING, replace_file
-from ..stability.zones import KINDS
+from ..files import replace_file
+from ..results.quantities import QUANTITIES
+from ..results.zones import KINDS
 from .backend import load
 from .surroundings import Box, surroundings
 from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
@@ -87,7 +88,7 @@ class Surface:
         The drawn meridian.
     revolution : Revolution
     values : ndarray
-        Of a quantity at the nodes; of "zone" between them: places in :data:`~femmembrane.stability.zones.KINDS`.
+        Of a quantity at the nodes; of "zone" between them: places in :data:`~femmembrane.results.zones.KINDS`.
     """
 
     equilibrium: Equilibrium
@@ -216,8 +217,8 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
         title = f"wrinkles by {criterion} stress"
     else:
         table = pyvista.LookupTable(_MAP, scalar_range=limits)
-        meaning, unit = MEANING[surface.quantity]
-        title = meaning if unit == "1" else f"{meaning} in {unit}"
+        shown = QUANTITIES[surface.quantity]
+        title = shown.meaning if shown.unit == "1" else f"{shown.meaning} in {shown.unit}"
     mapper = pyvista.DataSetMapper()
     mapper.lookup_table, mapper.scalar_range = table, table.scalar_range
     plotter.add_scalar_bar(

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..results.store import replace_file
+from ..files import replace_file
+from ..results.quantities import PLACES, QUANTITIES
 from .backend import drawing, load, title_text
 from .surroundings import Box, clamped_ends, surroundings
 from .vtk import smooth_profile
@@ -31,12 +32,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-PRESSURE_LABEL = "pressure P = pR₀/(μT)"
-VOLUME_LABEL = "volume V/R₀³"
-HEIGHT_LABEL = "pole height η(0)/R₀"
-RADIUS_LABEL = "radius ρ/R₀"  # noqa: RUF001
-#: what an axis can show
-QUANTITIES = {"volume": VOLUME_LABEL, "pressure": PRESSURE_LABEL, "center_height": HEIGHT_LABEL}
+VOLUME_LABEL, PRESSURE_LABEL, HEIGHT_LABEL, RADIUS_LABEL = (QUANTITIES[name].label for name in (*PLACES, "rho"))
 _DPI = 160
 #: branches of up to so many equilibria show them as dots
 _DOTS = 40
@@ -278,10 +274,10 @@ def draw_branch(
         For an unknown quantity.
     """
     for key, name in (("across", across), ("up", up)):
-        if name not in QUANTITIES:
-            raise unknown_name(key, name, QUANTITIES)
-    axes.set_xlabel(QUANTITIES[across])
-    axes.set_ylabel(QUANTITIES[up])
+        if name not in PLACES:
+            raise unknown_name(key, name, PLACES)
+    axes.set_xlabel(QUANTITIES[across].label)
+    axes.set_ylabel(QUANTITIES[up].label)
     axes.grid(color="0.9", linewidth=0.6)
     points = _coordinates(branch, (across, up))
     gaps = _gaps(branch, (across, up))
@@ -357,12 +353,12 @@ def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
     A special point lies between the two neighbours for which the way over it is the smallest detour, in volume, pressure and pole height
     together (in a picture of two of them the branch may cross itself); one that is far from the points shown lies between none.
     """
-    points, special = _coordinates(branch, tuple(QUANTITIES)), list(branch.special_points or ())
+    points, special = _coordinates(branch, PLACES), list(branch.special_points or ())
     scale = np.maximum(np.ptp(points, axis=0), 1e-300) if len(points) else 1.0
     a, b = points[:-1] / scale, points[1:] / scale
     direct = np.linalg.norm(b - a, axis=1)
     inside: list[list[tuple[float, SpecialPoint, Array]]] = [[] for _ in direct]
-    places, pictured = _coordinates(special, tuple(QUANTITIES)) / scale, _coordinates(special, quantities)
+    places, pictured = _coordinates(special, PLACES) / scale, _coordinates(special, quantities)
     for item, place, drawn in zip(special, places, pictured, strict=True):
         detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
         if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:

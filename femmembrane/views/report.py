@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import Status
-from ..results.store import replace_file
+from ..files import replace_file
 from ..results.table import estimated
 from . import plots
 from .backend import load

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..results.store import replace_file
+from ..files import replace_file
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
 from .picture import Surface, aim, check_quantity, draw_key, draw_surface, draw_surroundings, new_plotter

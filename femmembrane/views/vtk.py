@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError
-from ..results.files import refuse_no_folder
-from ..results.store import replace_file
+from ..files import refuse_no_folder, replace_file
 
 if TYPE_CHECKING:
     from ..results.records import Equilibrium

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
     from ..results.records import Branch, Equilibrium
+    from ..results.zones import Zones
     from ..scene import Scene
-    from ..stability.zones import Zones
 
 Array = NDArray[np.float64]
 
@@ -67,8 +67,6 @@ _CORE = "0.94"
 MERIDIAN_WIDTH, BRANCH_WIDTH = 8.0, 12.0
 #: points of a drawn zone of a meridian
 _POINTS = 101
-#: how often the way between two equilibria is halved to see where the kinds of zones change
-_HALVINGS = 10
 
 
 def zone_label(scene: Scene, kind: str) -> str:
@@ -137,7 +135,9 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     """
     from matplotlib.patches import Patch
 
-    for places, part in _runs(*_with_changes(branch, across)):
+    along = branch.zones_along()
+    places_of_all = np.interp(along.steps, np.arange(len(branch)), across)
+    for places, part in _runs(places_of_all, along.zones, along.snaps):
         edges = np.array([[part[0][0].s[0], *(zone.s[1] for zone in z)] for z in part])
         edges = np.concatenate([edges[:1], edges, edges[-1:]])
         for k, kind in enumerate(part[0].kinds):
@@ -152,37 +152,7 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     ]
 
 
-def _with_changes(branch: Branch, across: Array) -> tuple[Array, list[Zones], set[int]]:
-    """The zones of all equilibria and, where the kinds of zones change from one to the next, of states between them.
-
-    Returns their places, the zones, and the positions of the states that the membrane snapped to.
-    """
-    landings = {id(jump.landing) for jump in branch.jumps}
-    shown, snaps = [(across[0], branch[0].zones())], set()
-    for k, (a, b) in enumerate(pairwise(branch)):
-        between = [] if id(b) in landings else _changing(a, b, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS)
-        shown += [(across[k] + t * (across[k + 1] - across[k]), zones) for t, zones in between]
-        if id(b) in landings:
-            snaps.add(len(shown))
-        shown.append((across[k + 1], b.zones()))
-    return np.array([x for x, _ in shown]), [zones for _, zones in shown], snaps
-
-
-def _changing(
-    a: Equilibrium, b: Equilibrium, first: tuple[float, Zones], last: tuple[float, Zones], halvings: int
-) -> list[tuple[float, Zones]]:
-    """Zones of states on the straight line from a to b, closer and closer to where their kinds change; each with its part of the way."""
-    from ..stability.zones import find_zones
-
-    if first[1].kinds == last[1].kinds or not halvings:
-        return []
-    t = (first[0] + last[0]) / 2
-    state, pressure = (1 - t) * a.state + t * b.state, (1 - t) * a.pressure + t * b.pressure
-    middle = t, find_zones(a.scene, state, pressure, first[1].criterion)
-    return [*_changing(a, b, first, middle, halvings - 1), middle, *_changing(a, b, middle, last, halvings - 1)]
-
-
-def _runs(x: Array, zones: Sequence[Zones], snaps: set[int]) -> Iterator[tuple[Array, list[Zones]]]:
+def _runs(x: Array, zones: Sequence[Zones], snaps: frozenset[int]) -> Iterator[tuple[Array, list[Zones]]]:
     """Stretches with the same kinds of zones and no snap, and their places with those half-way to what comes before and after."""
     half = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
     if x.size == 1:

@@ -9,6 +9,7 @@ NetCDF opens such a file as any other.
 
 from __future__ import annotations
 
+import csv
 import errno
 import hashlib
 import hmac
@@ -18,21 +19,12 @@ import secrets
 import stat
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import InputError
+from .errors import InputError
 
-#: the record of a run, which makes its folder complete, and all files of one, in the order in which they are listed
-RECORD = "run.json"
-RUN_FILES = (
-    *("branch.csv", "special_points.csv", "zones.csv", RECORD),
-    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
-    "report.html",  # written from the rest, by whom it is asked for
-)
-#: the folder of the surfaces of a run
-SURFACES_FOLDER = "membrane"
 #: words that a sealed file has in its attributes, and before the digest at its end
 SEAL = "femmembrane seal, BLAKE2b-256:"
 _DIGITS = 64
@@ -95,6 +87,56 @@ def claimed(path: Path) -> Iterator[None]:
     finally:
         if descriptor >= 0:
             os.close(descriptor)
+
+
+@contextmanager
+def replace_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Write a file whole or not at all.
+
+    Yields the name of a temporary file in the same folder, with the same suffix. When the block ends well it takes the place of ``path``
+    in one step; when the block raises, ``path`` stays as it was and the temporary file is gone.
+
+    Raises
+    ------
+    InputError
+        When the folder does not exist or cannot be written to, or when a link, a pipe, a device or a folder has the name: none is replaced.
+    """
+    path = Path(path)
+    if not path.name or "\0" in str(path):
+        raise InputError("path", str(path), "the name of a file in an existing, writable folder is needed")
+    _refuse_irregular(path)
+    temporary = temporary_name(path)
+    try:
+        with claimed(temporary):
+            yield temporary
+            _refuse_irregular(path)  # it may have come in between
+            os.replace(temporary, path)
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError) as error:
+        raise InputError("path", str(path), f"a file in an existing, writable folder is needed ({error.strerror})") from error
+    finally:
+        if temporary.parent.is_dir():
+            temporary.unlink(missing_ok=True)
+
+
+def _refuse_irregular(path: Path) -> None:
+    if what := strange(path):
+        raise InputError("path", str(path), f"it is {what}, which no file replaces; another name is allowed")
+
+
+def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table of comma-separated values under a header line, whole or not at all.
+
+    Numbers are written so that they read back to the last bit; None is an empty cell.
+
+    Raises
+    ------
+    InputError
+        As :func:`replace_file`.
+    """
+    with replace_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def remove_leftovers(folder: Path) -> None:

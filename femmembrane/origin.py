@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
+from importlib import metadata
 from pathlib import Path
 
-from ..kernels import kernels
-from .store import package_version
+from .kernels import kernels
 
 #: distributions whose versions are noted
 NOTED_VERSIONS = ("femmembrane", "numpy", "scipy", "scikit-fem", "casadi")
+
+
+def package_version(name: str = "femmembrane") -> str:
+    """Version of an installed distribution, or ``unknown`` (a source tree that was never installed)."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "unknown"
 
 
 def processor() -> str:

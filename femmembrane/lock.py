@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 
-from ..errors import InputError
+from .errors import InputError
 from .files import lock, own_file
 
 NAME = ".lock"

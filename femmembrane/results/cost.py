@@ -1,0 +1,240 @@
+"""What a study of work against precision found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import files
+from ..errors import unknown_name
+from ..solve.controls import CONTROLS
+from . import door
+from .quantities import heading
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+STARTS = ("warm", "cold")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One line of a study.
+
+    Attributes
+    ----------
+    what : str
+        ``solve``: one equilibrium; ``stage``: a part of the work on it; ``effect``: an equilibrium without or with an effect.
+    method : str
+        ipopt or newton (finite elements), shooting, collocation, published; the name of the stage or effect.
+    start : str
+        warm (a neighbouring state is known) or cold; of an effect, off or on.
+    degree, elements, unknowns : int or None
+        Of the finite elements.
+    tolerance : float or None
+        Of a method with a tolerance in place of a mesh.
+    error : float
+        Relative, against the reference: of the pressure, or under pressure control of the volume. NaN where none is defined.
+    milliseconds : float
+        Median wall time; NaN if nothing came of it.
+    setup_milliseconds : float
+        What the first solve on a mesh takes longer than the others: building and, for IPOPT, compiling the problem.
+    iterations, evaluations : int or None
+        Of the solver, rejected steps included; right-hand sides of the independent methods.
+    repeats : int
+        How many times the median is of.
+    converged : bool
+    front : bool
+        Whether nothing with the same start is both faster and more accurate.
+    message : str
+        Why it did not converge.
+    """
+
+    what: str
+    method: str
+    start: str = ""
+    degree: int | None = None
+    elements: int | None = None
+    unknowns: int | None = None
+    tolerance: float | None = None
+    error: float = np.nan
+    milliseconds: float = np.nan
+    setup_milliseconds: float = np.nan
+    iterations: int | None = None
+    evaluations: int | None = None
+    repeats: int = 0
+    converged: bool = True
+    front: bool = False
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The equilibrium that errors are measured against.
+
+    Attributes
+    ----------
+    value : float
+        The pressure, or under pressure control the volume.
+    error : float
+        Relative difference from elements of twice the size, an upper estimate of its own error (at least 1e-14).
+    elements, degree : int
+    """
+
+    value: float
+    error: float
+    elements: int
+    degree: int
+
+
+#: columns of the table, and the machine with every line so that a table can stand alone
+COLUMNS = (*(f.name for f in fields(Measurement)), "machine")
+
+
+_TITLES = {
+    "newton": "finite elements, Newton",
+    "ipopt": "finite elements, IPOPT",
+    "shooting": "shooting, Newton",
+    "collocation": "collocation",
+    "published": "shooting as published",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Cost:
+    """What :func:`cost` measured.
+
+    Attributes
+    ----------
+    scene : Scene
+    control : str
+        volume, pressure or center_height.
+    load : float
+    quantity : str
+        pressure, or under pressure control volume: whose relative error is measured.
+    reference : Reference
+        What errors are measured against, and its own error.
+    lines : tuple of Measurement
+    machine : mapping of str to str
+        Processor, number of processors, system and versions.
+    """
+
+    scene: Scene
+    control: str
+    load: float
+    quantity: str
+    reference: Reference
+    lines: tuple[Measurement, ...] = field(repr=False)
+    machine: Mapping[str, str] = field(repr=False)
+
+    def select(self, **having: Any) -> tuple[Measurement, ...]:
+        """The lines with these attributes (``what="solve", method="newton", start="warm"``).
+
+        Raises
+        ------
+        InputError
+            For an attribute that a line does not have.
+        """
+        for name in having:
+            if name not in COLUMNS[:-1]:
+                raise unknown_name("select", name, COLUMNS[:-1])
+        return tuple(line for line in self.lines if all(getattr(line, name) == value for name, value in having.items()))
+
+    @property
+    def front(self) -> tuple[Measurement, ...]:
+        """The solves that no other one with the same start beats in both time and error, warm ones first, the fastest first."""
+        return tuple(sorted((line for line in self.lines if line.front), key=lambda line: (STARTS.index(line.start), line.milliseconds)))
+
+    def __str__(self) -> str:
+        return "\n".join(_text(self))
+
+    def to_dataframe(self) -> Any:
+        """All lines as a pandas DataFrame with the columns :data:`COLUMNS`."""
+        import pandas
+
+        return pandas.DataFrame(list(self._rows()), columns=list(COLUMNS))
+
+    def write_csv(self, path: str | PathLike[str]) -> None:
+        """Write all lines under a header, whole or not at all; what does not apply is left empty.
+
+        Raises
+        ------
+        InputError
+            When the folder does not exist or cannot be written to.
+        """
+        files.write_csv(path, COLUMNS, ([None if _absent(value) else value for value in row] for row in self._rows()))
+
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Error against milliseconds as a Matplotlib figure, also written to ``path`` if given."""
+        return door.plot_cost(self, path)
+
+    def _rows(self) -> Iterator[list[Any]]:
+        machine = ", ".join(self.machine.values())
+        for line in self.lines:
+            yield [*asdict(line).values(), machine]
+
+
+def _absent(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and np.isnan(value))
+
+
+def _number(value: Any, form: str, width: int) -> str:
+    return " " * (width - 1) + "-" if _absent(value) else f"{value:{width}{form}}"
+
+
+def _text(study: Cost) -> Iterator[str]:
+    letter = heading(study.quantity)
+    reference = study.reference
+    at = f"{CONTROLS[study.control].symbol} = {study.load:.9g}"
+    yield f"One equilibrium at {at}: relative error in {letter} and milliseconds (* nothing is better in both)"
+    yield (
+        f"reference: {letter} = {reference.value:.15g}, {reference.elements} elements of degree {reference.degree}, "
+        f"own error {reference.error:.1g}"
+    )
+    yield ", ".join(study.machine.values())
+    yield from _element_table(study, letter)
+    yield from _method_table(study, letter)
+    stages, effects = study.select(what="stage"), study.select(what="effect")
+    if stages:
+        yield f"\n{'parts, on ' + str(stages[0].elements) + ' elements of degree ' + str(stages[0].degree):<54} {'ms':>9}"
+        yield from (f"  {line.method:<52} {line.milliseconds:>9.3f}" for line in stages)
+    if effects:
+        yield f"\n{'one load step (Newton iterations)':<44} {'off ms':>14} {'on ms':>14}"
+        for off, on in zip(effects[::2], effects[1::2], strict=True):
+            times = (f"{line.milliseconds:9.3f} ({line.iterations:>2})" if line.converged else f"{'-':>14}" for line in (off, on))
+            yield f"  {off.method:<42} {' '.join(times)}"
+
+
+def _element_table(study: Cost, letter: str) -> Iterator[str]:
+    lines = study.select(what="solve")
+    kinds = list(dict.fromkeys((line.method, line.start) for line in lines if line.degree))
+    meshes = list(dict.fromkeys((line.degree, line.elements, line.unknowns) for line in lines if line.degree))
+    if not meshes:
+        return
+    heads = "".join(f"{method + ' ' + start:>14}" for method, start in kinds)
+    builds = list(dict.fromkeys(method for method, _ in kinds))
+    yield f"\ndegree elements unknowns {'error in ' + letter:>10}{heads}" + "".join(f"{'set-up ' + b:>15}" for b in builds)
+    for degree, n, unknowns in meshes:
+        own = {(line.method, line.start): line for line in lines if (line.degree, line.elements) == (degree, n)}
+        error = next((line.error for line in own.values() if line.converged), None)
+        times = "".join(_number(own[k].milliseconds, ".2f", 12) + (" *" if own[k].front else "  ") for k in kinds)
+        setups = [
+            next((own[k].setup_milliseconds for k in kinds if k[0] == b and not _absent(own[k].setup_milliseconds)), None) for b in builds
+        ]
+        yield f"{degree:>6} {n:>8} {unknowns:>8} {_number(error, '.1e', 10)}{times}" + "".join(_number(t, ".1f", 15) for t in setups)
+
+
+def _method_table(study: Cost, letter: str) -> Iterator[str]:
+    lines = [line for line in study.select(what="solve") if line.degree is None]
+    if lines:
+        yield f"\n{'method':<24} tolerance {'error in ' + letter:>10} {'ms':>12} {'iterations':>12} {'right-hand sides':>17}"
+    for line in lines:
+        time_ = _number(line.milliseconds, ".2f", 12) + (" *" if line.front else "  ")
+        yield (
+            f"{_TITLES[line.method]:<24} {line.tolerance:>9.0e} {_number(line.error, '.1e', 10)} {time_} {line.iterations:>10} "
+            f"{line.evaluations:>17}" + ("" if line.converged else f"  {line.message}")
+        )

@@ -1,0 +1,152 @@
+"""The one door from records up into the rooms that judge and draw them.
+
+Records stand below these rooms. They go up here alone, when one of their methods is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..potential import Array, Evaluation, Potential
+    from ..scene import Scene
+    from ..stability.profile import Profile
+    from .convergence import Convergence
+    from .cost import Cost
+    from .error_estimate import ErrorEstimate
+    from .folds import FoldCurve
+    from .records import Branch, Equilibrium
+    from .sweep import Sweep
+    from .verdict import Verdict
+    from .vibration import Vibration
+    from .zones import Zones, ZonesAlong
+
+
+# --- questions
+
+
+def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
+    """See :func:`femmembrane.stability.profile.profile_at`."""
+    from ..stability.profile import profile_at
+
+    return profile_at(scene, x, pressure, s)
+
+
+def checked_verdict(
+    potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str | None, azimuthal: int, compliance: float | None
+) -> Verdict:
+    """See :func:`femmembrane.stability.checked_verdict.checked_verdict`."""
+    from ..stability.checked_verdict import checked_verdict
+
+    return checked_verdict(potential, x, pressure, evaluation, control, azimuthal, compliance=compliance)
+
+
+def natural_frequencies(potential: Potential, x: Array, pressure: float, n: int, count: int, control: str) -> tuple[Vibration, ...]:
+    """See :func:`femmembrane.stability.frequencies.natural_frequencies`."""
+    from ..stability.frequencies import natural_frequencies
+
+    return natural_frequencies(potential, x, pressure, n, count, control)
+
+
+def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones:
+    """See :func:`femmembrane.stability.zones.find_zones`."""
+    from ..stability.zones import find_zones
+
+    return find_zones(scene, x, pressure, criterion)
+
+
+def zones_along(branch: Branch) -> ZonesAlong:
+    """See :func:`femmembrane.stability.zones.zones_along`."""
+    from ..stability.zones import zones_along
+
+    return zones_along(branch)
+
+
+def estimate_errors(potential: Potential, x: Array, pressure: float, control: str, verdicts: Mapping[str, Verdict]) -> ErrorEstimate:
+    """See :func:`femmembrane.accuracy.error_estimate.estimate_errors`."""
+    from ..accuracy.error_estimate import estimate_errors
+
+    return estimate_errors(potential, x, pressure, control, verdicts)
+
+
+# --- pictures and pages
+
+
+def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.plots.plot_pressure_volume`."""
+    from ..views.plots import plot_pressure_volume
+
+    return plot_pressure_volume(branch, path)
+
+
+def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.plots.plot_zones`."""
+    from ..views.plots import plot_zones
+
+    return plot_zones(branch, path)
+
+
+def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.folds.plot_fold_curve`."""
+    from ..views.folds import plot_fold_curve
+
+    return plot_fold_curve(curve, path)
+
+
+def plot_convergence(study: Convergence, path: str | PathLike[str] | None, quantities: Sequence[str] | None, against: str) -> Any:
+    """See :func:`femmembrane.views.convergence.plot_convergence`."""
+    from ..views.convergence import plot_convergence
+
+    return plot_convergence(study, path, quantities=quantities, against=against)
+
+
+def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.cost.plot_cost`."""
+    from ..views.cost import plot_cost
+
+    return plot_cost(study, path)
+
+
+def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.grid.plot_grid`."""
+    from ..views.grid import plot_grid
+
+    return plot_grid(sweep, path, show)
+
+
+def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[Path]:
+    """See :func:`femmembrane.views.vtk.write_vtk`."""
+    from ..views.vtk import write_vtk
+
+    return write_vtk(branch, path)
+
+
+def remove_surfaces(path: Path) -> None:
+    """See :func:`femmembrane.views.vtk.remove_surfaces`."""
+    from ..views.vtk import remove_surfaces
+
+    remove_surfaces(path)
+
+
+def write_report(branch: Branch, path: str | PathLike[str]) -> None:
+    """See :func:`femmembrane.views.report.write_report`."""
+    from ..views.report import write_report
+
+    write_report(branch, path)
+
+
+def branch_html(branch: Branch) -> str:
+    """See :func:`femmembrane.views.notebook.branch_html`."""
+    from ..views.notebook import branch_html
+
+    return branch_html(branch)
+
+
+def equilibrium_html(equilibrium: Equilibrium) -> str:
+    """See :func:`femmembrane.views.notebook.equilibrium_html`."""
+    from ..views.notebook import equilibrium_html
+
+    return equilibrium_html(equilibrium)

@@ -1,0 +1,98 @@
+"""Folds followed while a number of the scene changes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Status
+from . import door
+from .records import Equilibrium, SpecialPoint
+
+Array = NDArray[np.float64]
+
+
+FOLD_NAMES = {"limit_point": "limit point (dP = 0)", "volume_fold": "volume fold (dV = 0)"}
+
+
+@dataclass(frozen=True, eq=False)
+class Cusp(SpecialPoint):
+    """A point of a fold curve where the number is stationary along the curve, solved as an equation.
+
+    Attributes
+    ----------
+    kind : str
+        ``cusp``: two folds of the kind followed merge; on one side of ``value`` there are both, on the other none. ``branch_point``: a
+        limit point meets a volume fold, and branches of equilibria meet or separate.
+    value : float
+        The number there; its error is of second order in ``error``.
+    """
+
+    value: float = field(kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class FoldCurve:
+    """A fold followed in one number of the scene.
+
+    Attributes
+    ----------
+    kind : str
+        limit_point (dP = 0) or volume_fold (dV = 0).
+    parameter : str
+        Name of the number, as given.
+    values, pressure, volume, center_height : ndarray, shape (len(curve),)
+        The number, and the fold at it, in the order of the curve.
+    cusps : tuple of Cusp
+        Where the curve turns in the number.
+    equilibria : tuple of Equilibrium
+        The folds as equilibria, each of its own scene.
+    closed : bool
+        Whether the curve came back to its first point, which is then also the last.
+    status : Status
+        How the curve ended; with a ``message`` unless a bound was met or the curve closed.
+    timings : mapping of str to float
+        Seconds by stage.
+    """
+
+    kind: str
+    parameter: str
+    values: Array
+    pressure: Array
+    volume: Array
+    center_height: Array
+    cusps: tuple[Cusp, ...]
+    equilibria: tuple[Equilibrium, ...] = field(repr=False)
+    closed: bool = False
+    status: Status = Status.CONVERGED
+    message: str = ""
+    timings: Mapping[str, float] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.equilibria)
+
+    def __str__(self) -> str:
+        width = max(14, len(self.parameter))
+        lines = [FOLD_NAMES[self.kind], f"{self.parameter:>{width}} {'pressure':>14} {'volume':>14} {'pole height':>14}"]
+        rows = zip(self.values, self.pressure, self.volume, self.center_height, strict=True)
+        lines += [f"{m:>{width}.8g} {p:>14.9g} {v:>14.9g} {w:>14.9g}" for m, p, v, w in rows]
+        for c in self.cusps:
+            lines.append(f"{c.kind.replace('_', ' ')} at {self.parameter} = {c.value:.10g}: P = {c.pressure:.9g}, V = {c.volume:.9g}")
+        return "\n".join(lines + ([self.message] if self.message else []))
+
+    def to_dataframe(self) -> Any:
+        """The curve as a pandas DataFrame: a column named like the parameter, then pressure, volume and center_height."""
+        import pandas
+
+        return pandas.DataFrame(
+            {self.parameter: self.values, "pressure": self.pressure, "volume": self.volume, "center_height": self.center_height}
+        )
+
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Pressure and volume of the fold against the number as a Matplotlib figure, also written to ``path`` if given."""
+        return door.plot_fold_curve(self, path)

@@ -177,7 +177,9 @@ def stand_in(monkeypatch):
             return run(scene, on_step)
 
         monkeypatch.setitem(sys.modules, "femmembrane.verbs", types.SimpleNamespace(run=observed))
-        monkeypatch.setitem(sys.modules, "femmembrane.results.output", types.SimpleNamespace(write_run=write, clean=lambda folder: None))
+        from femmembrane.results import output
+
+        monkeypatch.setattr(output, "write_run", write)
         return written
 
     return install

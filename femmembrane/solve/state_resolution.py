@@ -110,7 +110,8 @@ def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str
     """What becomes of the state as elements are halved; empty where it is found again and loses its kinks."""
     first = largest_kink(potential, state.x)
     # the tip that a source draws out becomes round on very small elements alone, but its stretches are right long before
-    tip = bool(potential.sources) and where >= potential.space.n_elements - 1
+    # and so are those of a layer at a rim, which is as thin as the membrane makes it
+    tip = bool(potential.sources) or where < potential.space.n_elements - 1
     kink, largest = first, _largest_stretch(potential, state.x)
     for halving in range(_HALVINGS):
         scene, before = potential.scene, largest

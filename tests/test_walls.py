@@ -152,3 +152,14 @@ def test_library_code_neither_prints_nor_asserts(path):
     assert not [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Assert)]
     calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
     assert not [c for c in calls if ast.unparse(c) in ("print", "sys.exit", "exit", "quit")]
+
+
+def test_tests_mirror_the_package():
+    """Every folder of tests is a room of the package, or says what else it holds; no two files of tests have the same name."""
+    tests = Path(__file__).parent
+    folders = {path.parent.name for path in tests.rglob("test_*.py")} - {tests.name, "hard_cases", "verification"}
+    rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
+    assert len(folders) >= 12
+    assert folders <= rooms
+    names = [path.name for path in tests.rglob("test_*.py")]
+    assert len(names) == len(set(names))

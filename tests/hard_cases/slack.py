@@ -41,7 +41,7 @@ def traced_to_the_slack_circle() -> fm.Branch:
     return fm.trace(disc_scene(OGDEN, STRONG).replace(tension_field=True), start=2.1, until={"center_height": 0.1}, direction=-1)
 
 
-#: by shooting (tests/verification/test_tension_field.py): V/(2 pi), pole height and radius where the tension of the meridian vanishes
+#: by shooting (tests/verification/test_relaxed_states.py): V/(2 pi), pole height and radius where the tension of the meridian vanishes
 SLACK_AT = (0.0345, 0.3211, 0.731)
 
 
@@ -59,7 +59,7 @@ def slack_circle(elements: int) -> tuple[float, float, float]:
 @FAMILY.case("tension field above the slack circle", "zone borders lie inside elements", Number((3.234037, 0.262481), rel=2e-4), 64)
 @FAMILY.case("the same, 256 elements", "mesh-independent until it opens", Number((3.234037, 0.262481), rel=5e-6), 256)
 def above_the_slack_circle(elements: int) -> tuple[float, float]:
-    """P and V at a pole height of 0.34; recorded on 2026-11-24 with 1024 elements, see tests/verification/test_tension_field.py."""
+    """P and V at a pole height of 0.34; recorded on 2026-11-24 with 1024 elements, see tests/verification/test_relaxed_states.py."""
     eq = settled(fm.equilibrium(disc_scene(OGDEN, STRONG, elements).replace(tension_field=True), center_height=0.34))
     return eq.pressure, eq.volume
 

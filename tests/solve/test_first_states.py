@@ -1,0 +1,278 @@
+"""States that are asked for cold and are known to exist: each is answered, whatever its units, its signs, its supports and its symmetry.
+
+Numbers without another source are those of the independent dense walk of :mod:`.walker`, along small steps from a state that certainly
+exists, on the mesh of the test. :mod:`tests.verification.test_population` asks many more.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import femmembrane as fm
+
+SOLVERS = ("ipopt", "newton")
+NEO_HOOKEAN = fm.NeoHookean()
+
+
+def bulging(length, elements, bottom="hub"):
+    return fm.Scene(material=fm.Ogden.treloar(), mesh=fm.cylinder(length, elements, top="hub", bottom=bottom))
+
+
+# --- signs ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("pressure", [0.0, -0.0])
+@pytest.mark.parametrize("side", [1, -1])
+def test_zero_has_no_sign(pressure, side, solver):
+    """A heavy disc without pressure sags; its mirror image is pulled up."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.disc(64), loads=[fm.Weight(side * 3.0)])
+    eq = fm.equilibrium(scene, pressure=pressure, solver=solver)
+    assert eq.volume == pytest.approx(-side * 1.4948306027661, rel=1e-9)
+    assert eq.center_height == pytest.approx(-side * 0.9147174571375, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("volume", [0.0, -0.0])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_volume_of_zero_has_no_sign(volume, side, solver):
+    """Above a dipole a disc that encloses nothing is a dent in a ring."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.disc(32), sources=[fm.Dipole(200, -side * 3.75)], susceptibility=2.5)
+    eq = fm.equilibrium(scene, volume=volume, solver=solver)
+    assert eq.volume == pytest.approx(0.0, abs=1e-13)
+    assert (eq.pressure, eq.center_height) == pytest.approx((side * 0.5444264684703, -side * 0.1305430850578), rel=1e-8)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("mesh", "volume"), [(fm.disc(16), 1.0), (fm.annulus(0.3, 16), 0.8), (fm.cap(0.5, 16), 2.0), (fm.cap(-0.5, 16), 2.0)]
+)
+def test_mirror_images_find_what_their_images_find(mesh, volume, side):
+    """The strain energy knows no up and down: with the rim in the plane z = 0 the image of a state is a state, of the other signs."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=mesh)
+    up = fm.equilibrium(scene, volume=volume, solver="newton")
+    found = fm.equilibrium(scene, volume=side * volume, solver="newton")
+    # the image of a curved mesh is another one: equal to its order
+    assert found.pressure == pytest.approx(side * up.pressure, rel=1e-6)
+    assert fm.equilibrium(scene, pressure=found.pressure).volume == pytest.approx(side * volume, rel=1e-9)
+
+
+# --- tension fields ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("how", [{"pressure": 0.7482568711700937}, {"volume": 0.8}, {"center_height": 0.5701542757255915}])
+def test_a_wrinkled_pillow_is_found_cold(how, solver):
+    """Half a Mylar balloon: no state of it is taut everywhere, and at pressures below this one it is nearly the sheet without stretch."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cap(0.0, elements=64, rim="mirror"), tension_field=True)
+    eq = fm.equilibrium(scene, **how, solver=solver)
+    assert (eq.volume, eq.pressure) == pytest.approx((0.8, 0.7482568711700937), rel=1e-8)
+    assert eq.status is fm.Status.CONVERGED
+
+
+@pytest.mark.parametrize(("flatness", "pressure"), [(0.3, 0.40898), (0.5, 0.961698), (0.7, 1.040223)])
+@pytest.mark.parametrize("cells", [12, 16, 20, 24])
+def test_a_wrinkled_oblate_spheroid_is_found_on_every_mesh(flatness, pressure, cells):
+    """Flatter than 1/sqrt(2) the equator of an inflated spheroid is compressed, so that its tension field wrinkles; P of 48 cells."""
+    eq = fm.equilibrium(wrinkled_spheroid(flatness, cells), volume=1.5 * 4 / 3 * math.pi * flatness)
+    assert eq.status is fm.Status.CONVERGED
+    assert eq.pressure == pytest.approx(pressure, rel=1 / cells**2)
+
+
+def wrinkled_spheroid(flatness, cells):
+    angles = np.linspace(0, np.pi, 2 * cells + 1)
+    R = np.sin(np.minimum(angles, np.pi - angles))
+    mesh = fm.meridian_from_points(np.column_stack([R, flatness * np.cos(angles)]), [[2 * k, 2 * k + 2, 2 * k + 1] for k in range(cells)])
+    return fm.Scene(material=NEO_HOOKEAN, mesh=mesh, tension_field=True)
+
+
+# --- materials that lock ---
+
+
+def gent_sphere(pressure, jm):
+    """Stretch of a sphere of Gent's material at a pressure: P = W'(l)/l^2 with W = -jm/2 log(1 - (2 l^2 + l^-4 - 3)/jm)."""
+    return brentq(
+        lambda l: (2 * l - 2 * l**-5) / (1 - (2 * l**2 + l**-4 - 3) / jm) / l**2 - pressure,  # noqa: E741
+        1.2,
+        brentq(lambda l: 2 * l**2 + l**-4 - 3 - jm, 1, 10) * (1 - 1e-13),  # noqa: E741
+        xtol=1e-14,
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_sphere_next_to_locking(solver):
+    eq = fm.equilibrium(fm.Scene(material=fm.Gent(2.0), mesh=fm.sphere(16), degree=4), pressure=1000.0, solver=solver)
+    assert eq.volume == pytest.approx(4 / 3 * math.pi * gent_sphere(1000.0, 2.0) ** 3, rel=1e-5)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("mesh", "volume"),
+    [
+        (fm.disc(32), 2.5137468679092),
+        (fm.cylinder(2.0, 16, top="hub", bottom="hub"), 19.486569029032),
+        (fm.cap(0.5, 24), 3.4581531742227),
+    ],
+)
+def test_other_shapes_next_to_locking(mesh, volume, solver):
+    scene = fm.Scene(material=fm.Gent(2.0), mesh=mesh)
+    assert fm.equilibrium(scene, pressure=1000.0, solver=solver).volume == pytest.approx(volume, rel=1e-9)
+    assert fm.equilibrium(scene, volume=volume, solver=solver).pressure == pytest.approx(1000.0, rel=1e-3)
+
+
+def test_a_torus_next_to_locking():
+    scene = fm.Scene(material=fm.Gent(3.0), mesh=fm.torus(2.0, 16), degree=3)
+    assert fm.equilibrium(scene, volume=200.0).pressure == pytest.approx(7.625045196, rel=1e-8)
+
+
+def sphere_of_points(size, cells=16):
+    angles = np.linspace(0, np.pi, 2 * cells + 1)
+    R = np.sin(np.minimum(angles, np.pi - angles))
+    return fm.meridian_from_points(size * np.column_stack([R, np.cos(angles)]), [[2 * k, 2 * k + 2, 2 * k + 1] for k in range(cells)])
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("mesh", "volume", "degree"),
+    [
+        (fm.torus(2.0, 16), 280.0, 3),  # the branch ends at 215.67, where the pressure has no bound
+        (fm.cylinder(2.0, 16, top="hub", bottom="hub"), 40.0, 2),
+        (fm.cap(0.05, 24), 20.0, 2),
+        (sphere_of_points(7.0), 4e4, 2),  # more than 3^1.5 times 343 4 pi/3
+    ],
+)
+def test_a_volume_beyond_locking_is_refused_in_words(mesh, volume, degree, solver):
+    """No state has it: area grows by no more than 2.98, and P without bound at a smaller volume. Nothing more is claimed."""
+    with pytest.raises(fm.SolveError) as caught:
+        fm.equilibrium(fm.Scene(material=fm.Gent(3.0), mesh=mesh, degree=degree), volume=volume, solver=solver)
+    assert "turned back" not in str(caught.value)
+    assert "no tension holds" not in str(caught.value)
+
+
+@pytest.mark.parametrize("size", [1e-3, 7.0, 1e3])
+def test_points_of_any_size(size):
+    """The sphere of Gent's material through points; curved cells are parabolas, so that its volume is not quite that of the sphere."""
+    eq = fm.equilibrium(fm.Scene(material=fm.Gent(2.0), mesh=sphere_of_points(size)), pressure=100.0 / size)
+    assert eq.volume == pytest.approx(4 / 3 * math.pi * (gent_sphere(100.0, 2.0) * size) ** 3, rel=1e-4)
+
+
+# --- displacements that are zero, and faint loads ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("how", [{"volume": 9.0}, {"pressure": 0.5126121283412662}])
+def test_a_tube_between_two_plates_moves_along_no_axis(how, solver):
+    """Its axial displacement is exactly zero. W with l = sqrt(V/(2 pi)), l1 = 1: P = W'(l)/l."""
+    stretch = math.sqrt(9.0 / (2 * math.pi))
+    c1 = 0.5 / 1.1  # C1 and C2 = 0.1 C1, shear modulus 2 (C1 + C2) = 1
+    slope = 2 * c1 * (stretch - stretch**-3) + 2 * 0.1 * c1 * (stretch - stretch**-3)
+    scene = fm.Scene(material=fm.MooneyRivlin(0.1), mesh=fm.cylinder(2.0, 8, top="radial", bottom="radial"))
+    eq = fm.equilibrium(scene, **how, solver=solver)
+    assert slope / stretch == pytest.approx(0.5126121283, abs=5e-11)
+    assert (eq.volume, eq.pressure) == pytest.approx((9.0, slope / stretch), rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("pressure", [1e-6, 1e-10])
+def test_a_tube_with_hubs_at_a_faint_pressure(pressure, solver):
+    """Linear elasticity, whose compliance is that of the walk at P = 1e-6."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(2.0, 16, top="hub", bottom="hub"))
+    eq = fm.equilibrium(scene, pressure=pressure, solver=solver)
+    assert eq.pressure == pressure
+    assert eq.volume - 2 * math.pi == pytest.approx(FAINT * pressure, rel=1e-5, abs=4e-15)
+
+
+#: (6.28318840975097 - 2 pi)/1e-6 of the walk
+FAINT = 3.10257
+
+
+# --- tori ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("control", ["volume", "pressure"])
+def test_a_torus_as_thin_as_a_hose(control, solver):
+    """In the limit a tube with closed ends, W_1 = P l1 l2 and 2 W_2 = P l1^2; the aspect 1e4 corrects it by less than 1e-6."""
+    l1 = 1.2
+    slope = lambda a, b: a - a**-3 * b**-2  # neo-Hookean W_1(a, b)  # noqa: E731
+    l2 = brentq(lambda b: slope(l1, b) * l1 / b - 2 * slope(b, l1), 0.5, 2.0, xtol=1e-14)
+    pressure, volume = slope(l1, l2) / (l1 * l2), 2 * math.pi**2 * 1e4 * l1**2 * l2
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.torus(1e4, 24))
+    eq = fm.equilibrium(scene, **{control: {"volume": volume, "pressure": pressure}[control]}, solver=solver)
+    assert (eq.volume, eq.pressure) == pytest.approx((volume, pressure), rel=2e-4)
+
+
+def test_a_torus_almost_without_a_hole():
+    """The circle next to the axis is stretched more than a mesh shows: what 32 elements make of it is refused as that."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.torus(1.0001, 32))
+    with pytest.raises(fm.SolveError, match="the mesh does not resolve") as caught:
+        fm.equilibrium(scene, volume=36.0)
+    assert caught.value.status is fm.Status.NOT_RESOLVED
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("aspect", "volume", "pressure"), [(3.0, 65.14, 0.17181151831897), (3.0, 88.83, 0.5577610792421), (4.0, 197.4, 0.7522403636730)]
+)
+def test_a_torus_around_a_wire(aspect, volume, pressure, solver):
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.torus(aspect, 32), sources=[fm.Wire(1.0)], susceptibility=1.0)
+    assert fm.equilibrium(scene, volume=volume, solver=solver).pressure == pytest.approx(pressure, rel=1e-8)
+    assert fm.equilibrium(scene, pressure=pressure, solver=solver).volume == pytest.approx(volume, rel=1e-7)
+
+
+# --- long tubes that bulge ---
+
+
+@pytest.mark.parametrize(("volume", "pressure"), [(204.0, 0.5913023120204), (1600.0, 0.3810405476707)])
+def test_a_long_bulged_tube_is_found_cold(volume, pressure):
+    """The whole tube from its half with a mirror, which holds half the volume at the same pressure."""
+    assert fm.equilibrium(bulging(10.0, 60, bottom="mirror"), volume=volume / 2).pressure == pytest.approx(pressure, rel=1e-8)
+    assert fm.equilibrium(bulging(20.0, 120), volume=volume, solver="newton").pressure == pytest.approx(pressure, rel=1e-6)
+
+
+@pytest.mark.parametrize("start", [70.0, 71.0, 72.5, 80.0])
+def test_arc_length_passes_along_a_long_bulged_tube(start: float) -> None:
+    """A bulge far from both ends can shift at hardly any cost: the Hessian is nearly singular all along the branch."""
+    branch = fm.trace(bulging(20.0, 120), start=start, until={"volume": 1600.0}, special_points=False, max_steps=1000)
+    assert branch.status is fm.Status.CONVERGED
+    assert branch[-1].pressure == pytest.approx(0.3810405476707, rel=1e-6)
+
+
+# --- a rim that slides ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_weight_on_a_sliding_rim_leaves_one_rigid_motion(solver):
+    """Shifts across the axis cost nothing beside a weight, and the next mode with one wave is stable: a 3-D code has 0.98369."""
+    scene = fm.Scene(material=fm.MooneyRivlin(0.1), mesh=fm.cap(2.0, 24, rim="radial"), loads=[fm.Weight(0.05)])
+    eq = fm.equilibrium(scene, volume=15.0, solver=solver)
+    assert eq.pressure == pytest.approx(0.8078960713427, rel=1e-9)
+    verdict = eq.verdict(azimuthal=1)
+    assert verdict.stable is True
+    assert verdict.smallest_eigenvalue == pytest.approx(0.98369, abs=2e-5)
+
+
+@pytest.mark.parametrize("solver", ["newton", "ipopt"])
+@pytest.mark.parametrize("mesh", [fm.cap(0.6, 16), fm.sphere(12), fm.cylinder(2.0, 12), fm.torus(264.535, 21)], ids=lambda m: m.shape)
+def test_the_volume_at_rest_asks_for_nothing(mesh: Any, solver: str) -> None:
+    """It is known to round-off only, which moves nothing: P = 0 exactly at rest, and next to it P grows with the volume."""
+    scene = fm.Scene(material=fm.MooneyRivlin(0.1), mesh=mesh, degree=2)
+    rest = fm.equilibrium(scene, pressure=0.0, solver="newton").volume
+    assert fm.equilibrium(scene, volume=rest, solver=solver).pressure == pytest.approx(0.0, abs=1e-12)
+    near = [fm.equilibrium(scene, volume=rest * (1 + part), solver=solver).pressure for part in (1e-7, 2e-7)]
+    assert near[1] == pytest.approx(2 * near[0], rel=1e-5)
+
+
+def test_a_cap_whose_pole_is_in_the_plane_of_its_rim_is_not_at_rest() -> None:
+    """Pressure, volume and pole height of a dome that is pushed in pass zero close together, but it is no flat membrane there."""
+    scene = fm.Scene(material=fm.MooneyRivlin(0.1), mesh=fm.cap(0.6, 16), degree=2)
+    found = fm.equilibrium(scene, center_height=0.0)
+    beside = [fm.equilibrium(scene, center_height=h) for h in (-1e-3, 1e-3)]
+    assert found.center_height == pytest.approx(0.0, abs=1e-12)
+    assert found.pressure == pytest.approx((beside[0].pressure + beside[1].pressure) / 2, rel=1e-2)
+    assert found.volume == pytest.approx((beside[0].volume + beside[1].volume) / 2, rel=1e-2)

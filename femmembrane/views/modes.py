@@ -49,7 +49,7 @@ def write_mode_vtk(
     """Write one period of a mode as one VTU file a frame and the PVD file that strings them together for ParaView.
 
     The VTU files go to a folder beside ``path``, named like it. Frame k has the phase 2 pi k/frames, so that the first shows the mode at
-    full amplitude, and after the last the motion repeats. The point data ``displacement`` is that from the equilibrium. Lengths are in m
+    full amplitude, and after the last the motion repeats. The point data ``displacement`` starts at the equilibrium. Lengths are in m
     where the scene has scales.
 
     Parameters

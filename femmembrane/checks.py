@@ -41,7 +41,7 @@ def is_number(value: object) -> bool:
 
 
 def is_whole(value: object, least: int = 1, most: int | None = None) -> bool:
-    """Whether a value is a whole number between two bounds, both included; 4.0 is none."""
+    """Whether a value is a whole number between two bounds, both included. 4.0 is not."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         return False
     return bool(least <= value and (most is None or value <= most))
@@ -162,7 +162,7 @@ def choice(key: str, value: Any, known: Iterable[str]) -> str:
 
 
 def only(owner: str, given: Mapping[str, Any], allowed: str) -> tuple[str, Any]:
-    """The one argument that is given out of several of which exactly one must be.
+    """The name and value of the one argument that is given, out of several that exclude each other.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def only(owner: str, given: Mapping[str, Any], allowed: str) -> tuple[str, Any]:
 
 
 def sequence(key: str, values: Any, allowed: str, most: int = MAX_ITEMS) -> tuple[Any, ...]:
-    """The entries of a list or another iterable as a tuple; a text or a mapping is none.
+    """The entries of a list or another iterable as a tuple. Texts and mappings are refused.
 
     Parameters
     ----------

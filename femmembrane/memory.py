@@ -25,7 +25,7 @@ def available() -> int | None:
 
 
 def require(key: str, count: int, each: int, what: str) -> None:
-    """Raise InputError, with the number that is allowed, unless there is room for so many times so many bytes.
+    """Raise InputError with the number that is allowed, unless there is room for ``count`` items of ``each`` bytes.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def _machine() -> Iterator[int]:
 
 
 def _groups() -> Iterator[int]:
-    """Of the control groups that the process is in, and those around them."""
+    """Of the control groups that the process is in, and of the groups around these."""
     with suppress(OSError, ValueError):
         for line in Path("/proc/self/cgroup").read_text().splitlines():
             _, controllers, name = line.split(":", 2)

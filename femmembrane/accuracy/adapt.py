@@ -2,8 +2,8 @@
 
 The run is made once on a trial mesh, at a few of its loads. Where the membrane is hard to describe is read off its states: by how much
 the best that elements of a lower degree could do misses them, element by element. Elements of degree p share that evenly if their sizes
-follow the density of the misses to the power 1/(2 p + 1), one density for all states, each with the weight of its own estimated error.
-The number of elements is then found by estimating the errors of the hardest states on meshes with that grading.
+follow the density of the misses to the power 1/(2 p + 1). There is one density for all states, in which each has the weight of its own
+estimated error. The number of elements is then found by estimating the errors of the hardest states on meshes with that grading.
 
 The degree grows by half with every digit asked for, and falls again where the fewest elements give more. Unknowns are then within a small
 factor of the least possible. With equal elements the hardest of the reference scenes (recorded on 2026-11-24) need for 1e-4, 1e-6, 1e-8
@@ -67,9 +67,9 @@ _LEAST_DENSITY, _LEAST_PRESSURE = 0.1, 0.01
 def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
     """The scene on a mesh that keeps the errors of P and of the total energy below the accuracy that its open mesh asks for.
 
-    Errors are those at the same volume, at the same pole height for a run by heights, and with arc length the smaller of both, which is
-    regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run, and over
-    the sum of the sizes of elastic and magnetic energy. States without an estimate (compressed, slack) do not count.
+    Errors are compared at the same volume, and in a run by heights at the same pole height. With arc length the smaller of both counts,
+    since it is regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run,
+    and over the sum of the sizes of elastic and magnetic energy. States without an estimate (compressed, slack) do not count.
 
     Parameters
     ----------
@@ -91,8 +91,9 @@ def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
 
 @dataclass(frozen=True)
 class Shortfall:
-    """Where a run leaves the accuracy that its mesh was chosen for: ``kept`` equilibria are as good as asked for, ``error`` is the estimate
-    for the next one, NaN where there is none."""
+    """Where a run leaves the accuracy that its mesh was chosen for. ``kept`` equilibria are as accurate as asked; ``error`` is the estimate
+    for the next one, or NaN without an estimate.
+    """
 
     kept: int
     accuracy: float
@@ -150,7 +151,7 @@ def _way(branch: Branch, kept: int) -> float:
 
 
 def _checked(branch: Branch) -> list[int]:
-    """Equilibria of a run whose errors say most: some all along, the extreme ones, and those with the largest kinks."""
+    """Equilibria of a run whose errors say most: some all along, the extreme ones, and the ones with the largest kinks."""
     potential = branch[0].potential
     kinks = [largest_kink(potential, eq.state) for eq in branch]
     return sorted({*spread([eq.volume for eq in branch]), *np.argsort(kinks)[-_TRIED:].tolist()})

@@ -82,7 +82,7 @@ def _first(form: StrongForm, guess: Guess, scale: float) -> tuple[Array, Array]:
         raise InputError("guess.profile", None, "missing; collocation sets out from a profile with columns r, rho and eta")
     r, rho, eta = (np.asarray(guess.profile[name], dtype=float) for name in ("r", "rho", "eta"))
     if r.ndim == 1 and r.size > 2 and abs(r[0]) <= LEAST_LENGTH and abs(r[-1] - 1) <= LEAST_LENGTH:
-        r = np.array([0.0, *r[1:-1], 1.0])  # whoever computes the ends meets them to round-off only
+        r = np.array([0.0, *r[1:-1], 1.0])  # computed ends are exact to round-off only
     if r.ndim != 1 or r.size < 3 or r[0] != 0 or r[-1] != 1 or not (np.diff(r) > 0).all() or not (r.shape == rho.shape == eta.shape):
         raise InputError(
             "guess.profile", f"{r.size} radii", "three or more increasing radii from 0 to 1 are allowed, with rho and eta at each"

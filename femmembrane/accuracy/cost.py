@@ -145,7 +145,7 @@ def relative_error(value: float, exact: float) -> float:
 def with_front(lines: Sequence[Measurement], floor: float) -> tuple[Measurement, ...]:
     """The lines with those marked that no other solve with the same start beats in both time and error.
 
-    Errors below ``floor``, that of the reference, count as equal.
+    Errors below ``floor``, the error of the reference, count as equal.
     """
     marked = list(lines)
     for start in STARTS:

@@ -1,7 +1,7 @@
 """Shooting from the pole: the equations are integrated to the rim, and what is not known at the pole is chosen so that the rim is met.
 
-Two methods: :func:`shoot`, with a high-order integrator and Newton's method, and :func:`shoot_as_published`, that of Saxena, Reddy &
-Pradhan (2019), section 3 and appendix: from r = 1e-5 with a Runge-Kutta pair of order 5(4) and the simplex of Nelder and Mead.
+There are two methods. :func:`shoot` has a high-order integrator and Newton's method. :func:`shoot_as_published` is the method of Saxena,
+Reddy & Pradhan (2019), section 3 and appendix: from r = 1e-5 with a Runge-Kutta pair of order 5(4) and the simplex of Nelder and Mead.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class _Shooter:
             dy = self.form.rates(r, y, p)
             return dy.ravel() if not extra else np.concatenate([dy, self.form.densities(r, y)[:extra]]).ravel()
 
-        with np.errstate(all="ignore"):  # a wild guess may leave the domain of the energy: whoever asked sees NaN
+        with np.errstate(all="ignore"):  # a wild guess may leave the domain of the energy: the caller sees NaN
             first = self._first(center, stretch, pressure)[: 4 + extra]
             if not np.isfinite(first).all():
                 return failed

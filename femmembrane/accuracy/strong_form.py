@@ -12,7 +12,8 @@ are (e_2, eta, d, phi) with d = e_1 - e_2: at the pole d and phi vanish and ever
 
     y' = S y/r + f(r, y),      S = [[0 0 1 0], [0 0 0 0], [0 0 -2 0], [0 0 0 -1]],      f(0, y) = (0, 0, 0, (m_eta - P lambda^2)/W_1)
 
-and at the rim e_2 = eta = 0. The energies, the volume and the force of the sources are those of the material's and the sources' formulas.
+and at the rim e_2 = eta = 0. The energies, the volume and the force of the sources follow from the formulas of the material and the
+sources.
 """
 
 from __future__ import annotations
@@ -250,7 +251,7 @@ class Solution:
         return {"r": at, "rho": np.exp(e2) * at, "eta": eta, "stretch_1": np.exp(e2 + d), "stretch_2": np.exp(e2)}
 
 
-#: what may be prescribed, as the position of its number in (center_height, stretch, pressure); a volume is none of them
+#: what may be prescribed, as the position of its number in (center_height, stretch, pressure); a volume has no position there
 POLE_UNKNOWN: Mapping[str, int | None] = {"center_height": 0, "pressure": 2, "volume": None}
 
 

@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()  # what does not fit on the disk is told here, not by Python at its end
     except CycloptsError as error:
         return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
-    except BrokenPipeError:  # whoever reads the pipe has seen enough
+    except BrokenPipeError:  # the reader of the pipe has seen enough
         drop(sys.stdout)
         return DONE
     except InputError as error:

@@ -41,7 +41,7 @@ def _write(stream: TextIO, text: str) -> None:
 
 
 def open_streams() -> None:
-    """Streams that whoever started the process has closed lead nowhere; a file opened later cannot take their place.
+    """Streams that were closed before the process started lead nowhere. A file that is opened later cannot take their place.
 
     What cannot be encoded for the reader of the output is written as an escape.
     """
@@ -72,7 +72,7 @@ def drop(stream: TextIO) -> None:
 
 
 def refused(error: BaseException) -> bool:
-    """Whether an error says that the system did not take what was to be written, and nothing of what that was."""
+    """Whether an error says that the system refused to write, rather than that something is wrong with the data."""
     return isinstance(error.__cause__ if isinstance(error, InputError) else error, OSError)
 
 

@@ -81,7 +81,7 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
 
 
 def _ended(scene: Scene, out: Path) -> int | None:
-    """The exit code of the run of this scene that has completed the folder, None if there is none and something is to be computed."""
+    """The exit code of the run of this scene that completed the folder; None if something is still to be computed."""
     from ..results.checkpoint import refuse_others
     from ..results.output import read_record
 
@@ -125,7 +125,7 @@ def _compute(scene: Scene, interrupts: Interrupts, checkpoints: Checkpoints) -> 
 
 
 def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Status, message: str) -> Branch:
-    """The branch of what was found before the computation ended early; special points are not searched for."""
+    """The branch of the equilibria found before the computation ended early. Special points are not searched for."""
     from ..results.records import Branch
 
     used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way

@@ -50,8 +50,8 @@ def mended(points: Array, step: int) -> tuple[Array, tuple[str, ...]]:
 def merged(points: Array, cells: Cells) -> tuple[Cells, tuple[str, ...]]:
     """Cells whose points are one where they are meant to be, each cell once.
 
-    Points that agree to round-off of double precision are one. Loose ends, points at which a single cell ends, are joined where they agree
-    to that of single precision: in a mesh that is graded strongly two points of one element may be as close.
+    Points that agree to round-off of double precision are one. Loose ends are points at which a single cell ends. They are joined where
+    they agree to round-off of single precision. Other points are not: in a strongly graded mesh two points of one element may be as close.
     """
     used = np.unique(cells)
     if not np.isfinite(points[used]).all():
@@ -92,7 +92,7 @@ def merged(points: Array, cells: Cells) -> tuple[Cells, tuple[str, ...]]:
 
 
 def _once(cells: Cells, lengths: Array) -> tuple[Cells, Array, int]:
-    """Cells without those that are there before, in either direction."""
+    """Cells without repetitions; a cell counts as repeated in either direction."""
     turned = np.concatenate([np.sort(cells[:, :2], axis=1), cells[:, 2:]], axis=1)
     _, first = np.unique(turned, axis=0, return_index=True)
     first.sort()
@@ -100,7 +100,7 @@ def _once(cells: Cells, lengths: Array) -> tuple[Cells, Array, int]:
 
 
 def _groups(points: Array, distance: float) -> NDArray[np.int64]:
-    """For each point the first of those that lie within a distance, or in a chain of such steps."""
+    """For each point the first point that lies within a distance of it, or is reached in a chain of such steps."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

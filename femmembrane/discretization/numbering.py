@@ -140,7 +140,7 @@ class Numbering:
 
     @property
     def units(self) -> dict[str, float]:
-        """What pressures, volumes and heights of this membrane are measured by, in those of R0."""
+        """Natural units of pressures, volumes and heights of this membrane, in the units of R0."""
         return {"pressure": 1 / self.unit, "volume": self.unit**3, "center_height": self.unit}
 
     def between(self, at_ends: list[float]) -> tuple[Array, Array]:
@@ -208,7 +208,7 @@ class Numbering:
 
     @cached_property
     def volume_round_off(self) -> float:
-        """What volumes next to that at rest are known to: round-off of the parts that it is the sum of."""
+        """Round-off of volumes next to the volume at rest, which is a sum of larger parts."""
         return 4 * float(np.finfo(float).eps * (self.weights * np.abs(self._volume_density)).sum())
 
     @property
@@ -234,7 +234,7 @@ class Numbering:
     def interpolation_points(self) -> Array:
         """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""
         points = self.ends[:-1] + lobatto(self.degree)[:, None] * self.sizes
-        points[0], points[-1] = self.ends[:-1], self.ends[1:]  # neighbours share their end, and the last one is that of the meridian
+        points[0], points[-1] = self.ends[:-1], self.ends[1:]  # neighbours share their end, and the last end belongs to the meridian
         return points
 
     def node_parameters(self) -> Array:

@@ -1,10 +1,10 @@
 """Finite-element space on a meridian, as plain arrays.
 
 scikit-fem supplies elements, degrees of freedom, quadrature and the map from the reference element; what leaves this room is NumPy
-only. Unknowns are the coefficients of the displacement (u, w), numbered along the meridian and interleaved, so that every matrix of the
-problem is banded with half bandwidth 2 degree + 1; those of a closed curve are numbered as if it were folded flat, which doubles the
-bandwidth. Points are numbered quadrature point first, element second: with arrays of shape
-(rows * n_quadrature, n_elements) gathering, evaluating and assembling are one matrix product each.
+only. Unknowns are the coefficients of the displacement (u, w), numbered along the meridian and interleaved. So every matrix of the problem
+is banded with half bandwidth 2 degree + 1. The unknowns of a closed curve are numbered as if it were folded flat, which doubles the
+bandwidth. Points are numbered quadrature point first, element second: with arrays of shape (rows * n_quadrature, n_elements) gathering,
+evaluating and assembling are one matrix product each.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _RECOVERED = 3
 class Space(Numbering):
     """Displacements (u, w) of one degree on one meridian: their values from coefficients, and integrals against their shape functions.
 
-    Parameters and further attributes are those of :class:`.numbering.Numbering`.
+    Parameters and further attributes: see :class:`.numbering.Numbering`.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ class Space(Numbering):
         return np.linalg.inv(values).astype(np.float64, copy=False)
 
     def evaluate(self, x: Array, s: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """(u, u_s, w, w_s) at parameters s, slopes with respect to s; at an element end those of the element that starts there."""
+        """(u, u_s, w, w_s) at parameters s, slopes with respect to s. At an element end the element that starts there gives the slopes."""
         element, xi = self.locate(s)
         value, slope = self.shape_functions(xi)
         coefficients = self.extend(x)[self.gather[:, element]]
@@ -221,7 +221,7 @@ class Space(Numbering):
     def kinks(self, x: Array) -> Array:
         """Jumps of the deformed meridian's slope, relative to the smaller of both sides: where elements meet, then at the poles.
 
-        The slope is that with respect to arc length at rest, a vector as long as the meridional stretch. At a pole it is compared with its
+        The slope is taken with respect to arc length at rest: a vector as long as the meridional stretch. At a pole it is compared with its
         mirror image. What is kinked at rest counts only as far as it is more kinked now.
 
         Returns
@@ -265,9 +265,9 @@ class Space(Numbering):
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.
 
-        The slope of a finite-element solution of degree p is superconvergent at the p Gauss points of an element. A polynomial through
-        those of two neighbours gives the slope at the end they share, one through the ends and the Gauss points of an element the rest.
-        From degree 4 on the slopes themselves are the better ones at pole and rim (measured), and are returned as they are.
+        The slope of a finite-element solution of degree p is superconvergent at the p Gauss points of an element. A polynomial through the
+        points of two neighbours gives the slope at the end they share. A polynomial through the ends and the Gauss points of an element
+        gives the rest. From degree 4 on the slopes themselves are the better ones at pole and rim (measured), and are returned as they are.
         """
         element, xi = self.locate(s)
         if self.n_elements == 1 or self.degree > _RECOVERED:

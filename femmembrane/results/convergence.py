@@ -74,8 +74,8 @@ class Convergence:
     reference : mapping of str to float
         The same on the reference mesh.
     errors : mapping of str to ndarray
-        |value - reference| over ``scale``. ``profile_l2`` and ``profile_h1`` are norms of the difference d of (rho, eta), over the same norm
-        of the reference. Their squares are Int |d|^2 2 pi R dS, and for H1 Int |dd/dS|^2 2 pi R dS in addition.
+        |value - reference| over ``scale``. ``profile_l2`` and ``profile_h1`` are norms of the difference d of (rho, eta), over the same
+        norm of the reference. Their squares are Int |d|^2 2 pi R dS, and for H1 Int |dd/dS|^2 2 pi R dS in addition.
     floors : mapping of str to float
         Error of the reference in the same measure: the distance to other fine meshes, at least round-off.
     scale : mapping of str to float

@@ -57,7 +57,7 @@ class FinishedScenes:
             self._file.execute("PRAGMA user_version = 1")  # writes, and so takes the lock
             found = self._file.execute("PRAGMA quick_check(1)").fetchall()
             self._file.execute("SELECT key, row FROM scene LIMIT 1").fetchall()
-        except (sqlite3.Error, ValueError) as error:  # ValueError: what should be text is none
+        except (sqlite3.Error, ValueError) as error:  # ValueError: something that should be text is not
             found = [(error,)]
         if found != [("ok",)]:
             self._file.close()

@@ -84,7 +84,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "mesh": ("degree",),
     "effects": ("tension_field",),
 }
-#: size of a scene file: a million elements by their radii; what goes on for ever is none
+#: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
 MAX_BYTES = 2**25
 #: where else an argument without a default may come from, for the message when it is missing
 _OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}

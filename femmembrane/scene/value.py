@@ -133,7 +133,7 @@ class Scene:
         self._check_hubs()
 
     def _check_size(self) -> None:
-        """Refuse what there is no room for, before any of it is built."""
+        """Refuse a scene that the memory has no room for, before anything is built."""
         if self.open:
             return
         count, degree = self.mesh.elements, self.degree

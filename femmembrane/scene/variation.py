@@ -9,8 +9,8 @@
 ``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
 ======================== ==================================================================================================
 
-The two rules for Ogden's material keep the sum of mu alpha at 2, that is the shear modulus at 1, the unit of stress; the number that is
-named is always the one that the scene of a value holds.
+The two rules for Ogden's material keep the sum of mu alpha at 2, and so the shear modulus at 1, the unit of stress. The scene of a value
+holds exactly this value of the named number.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The same equilibrium in another finite-element space of its scene: carried over by interpolation and solved again.
 
-How far an answer moves when the space grows says how far it is from that of the continuum.
+An answer that moves far when the space grows is far from the answer of the continuum.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .state import State, distance
 FAR = 0.2
 #: spaces, each finer than the one before, in which a doubtful answer is looked at again
 LEVELS = (1, 2)
-#: relative residual above which a state is no equilibrium, and none of another space stands for it
+#: relative residual above which a state is no equilibrium, so that no state of another space stands for it
 _BALANCED = 1e-6
 #: most iterations of a damped solve: ordinary ones take one to three
 _MAX_ITERATIONS = 30
@@ -73,7 +73,7 @@ def solved_past_folds(onto: Potential, control: Control, potential: Potential, s
 def counterpart(
     potential: Potential, evaluation: Evaluation, pressure: float | None = None, held: str = "volume", level: int = 1
 ) -> NewtonResult | None:
-    """The state of an evaluation in a finer space, whose potential is ``result.evaluation.potential``; None where there is none.
+    """The state of an evaluation in a finer space, with the potential ``result.evaluation.potential``; None where it was not found.
 
     Parameters
     ----------

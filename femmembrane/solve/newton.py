@@ -16,15 +16,15 @@ from .controls import ArcLengthControl, Control, VolumeControl
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
-#: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it: one along which
-#: the membrane is so soft, such as a shift of a bulge in a long tube, that round-off decides it
+#: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it; round-off decides
+#: corrections along very soft directions, such as the shift of a bulge in a long tube
 ROUND_OFF, SOFT = 2e-14, 1e-4
-#: residual from which on corrections along a soft direction go on, in the hope of one that ends in balance
+#: residual from which on corrections along a soft direction go on, since one of them may end in balance
 NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
-#: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
+#: largest force of a correction of P, relative to the forces that meet at a node: a guess may have the right shape and a wrong P
 PRESSURE = 1e-9
 
 
@@ -100,8 +100,8 @@ def correct(
         x, pressure = (x + dx, pressure + dp) if length == 1 else (x + length * dx, pressure + length * dp)
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x and the correction that the
-        # factors at hand make of it (next to a limit point a small residual may be far from the solution) have the last word
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, together
+        # with its correction by the factors at hand: next to a limit point a state with a small residual may be far from the solution
         foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
@@ -175,7 +175,7 @@ class Equations:
         return self._factored.solve(self.unbalanced, -gap)
 
     def size(self, dx: Array) -> float:
-        """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""
+        """:func:`relative_size` of a correction, without a component that is zero and in balance to round-off."""
         largest = self.evaluation.elements.largest
         change, size = largest(dx), largest(self.x)
         worst = _relative(change, size)
@@ -237,7 +237,7 @@ def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
 
 def residuals_over(size: tuple[float, float], scales: tuple[float, float]) -> tuple[float, float]:
     """Out-of-balance forces along u and along w over the forces that meet at a node."""
-    # where no force acts along one of them, what is there is round-off of the other
+    # a component without forces along it holds round-off of the other component
     least = _EPSILON * max(scales)
     u, w = (r / max(s, least) if r else 0.0 for r, s in zip(size, scales, strict=True))
     return u, w

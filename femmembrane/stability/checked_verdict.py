@@ -28,7 +28,8 @@ _SLOWEST = 0.1
 _FALSE = "stress is compressive on this mesh alone, not on finer elements"
 #: discretisation errors are estimated to a factor of two or so: this many times the estimate contain them
 SAFETY = 3.0
-#: part of a small eigenvalue below which one is zero: that of a marginal state of this mesh, or of a mesh on which zero means zero
+#: part of a small eigenvalue below which an eigenvalue counts as zero: for a marginal state of this mesh, and for a mesh on which zero
+#: means zero
 _ZERO = 0.1
 
 
@@ -87,7 +88,7 @@ def _verdict(
 def _with_discretisation_error(
     verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict]
 ) -> Verdict:
-    """Solve again on elements of one degree more (or half the size): by how much an eigenvalue moves decides its sign.
+    """Solve again on elements of one degree more (or half the size). The change of an eigenvalue decides whether its sign is known.
 
     Where the sign stays open although the mesh is too coarse to call it zero, a still finer space is tried; what it settles is reported.
     """
@@ -107,7 +108,7 @@ def _with_discretisation_error(
     if best is None:
         return _open(verdict, error)
     rest = abs(best.smallest_eigenvalue - better.smallest_eigenvalue)
-    # changes that shrink slowly add up, as those of a geometric series, and may yet grow where convergence has hardly begun
+    # changes that shrink slowly add up like a geometric series, and they may still grow where convergence has hardly begun
     error = verdict.error + 2 * SAFETY * max(change / max(1 - rest / change, _SLOWEST) if change else 0.0, change + rest)
     if abs(value) > error and np.isfinite(verdict._unresolved):
         return replace(verdict, error=error)

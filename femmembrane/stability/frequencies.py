@@ -1,7 +1,7 @@
 """Natural frequencies: small oscillations of the membrane about an equilibrium.
 
-A perturbation phi exp(s t) obeys s^2 M phi = -K phi, with K the second variation and M the mass of the reference area, so that the
-eigenvalues lambda of a verdict are squared frequencies. Each gives a pair of roots s = +- sqrt(-lambda)::
+A perturbation phi exp(s t) obeys s^2 M phi = -K phi, with K the second variation and M the mass of the reference area. So the eigenvalues
+lambda of a verdict are squared frequencies. Each gives a pair of roots s = +- sqrt(-lambda)::
 
     lambda > 0     s = +- i omega             oscillation, omega = sqrt(lambda)
     lambda < 0     s = +- growth_rate         departure, growth_rate = sqrt(-lambda)

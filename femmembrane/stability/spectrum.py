@@ -193,7 +193,7 @@ class Pencil:
             mode, right = self.normalised(mode)
             value, error = self.quotient(mode, right)
             # an absolute floor alone would stop too early on a nearly flat membrane, whose modes are decades softer than the scale
-            # the error of the value is of second order in that of the mode
+            # the error of the value is of second order in the error of the mode
             if error <= tolerances.converged * abs(value) or (
                 error > tolerances.shrinking * best and error <= tolerances.rounding * self.noise(mode)[1]
             ):
@@ -225,7 +225,7 @@ class Pencil:
         return value, float(np.sqrt(np.sum(residual**2 / self.mass[2 * self.kd])))
 
     def below(self, value: float, mode: Array) -> int:
-        """Number of eigenvalues clearly below that of a mode, by inertia."""
+        """Number of eigenvalues clearly below the eigenvalue of a mode, by inertia."""
         # the flat unloaded disc has no stiffness to cancel: there it takes a shift of any size to tell zero from negative
         t = _TOLERANCES
         shift = value - max(t.gap * abs(value), t.noise * self.noise(mode)[0], t.floor * self.scale)

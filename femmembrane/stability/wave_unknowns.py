@@ -99,8 +99,8 @@ def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
     """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
 
     What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
-    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no
-    perturbations: one node is held against them, which takes none of the others away.
+    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no perturbations.
+    One node is held against them, and no other motion is lost.
     """
     free = np.ones((space.n_nodes, 3), dtype=bool)
     opposite = []

@@ -13,7 +13,7 @@ field the mechanical stress across wrinkles is exactly zero; there the strain be
 
     g_1 = e_1 + max(e_2, 0)/2,      g_2 = e_2 + max(e_1, 0)/2
 
-which vanishes where the membrane stops being taut, as the stress of the plain material does.
+It vanishes where the membrane stops being taut, as the stress of the plain material does.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def _roots(deciding: _Stresses, which: NDArray[np.int64], a: Array, b: Array, ne
     for _ in range(_ROUNDS):
         s = np.linspace(a, b, _PARTS + 1)
         values = np.stack(deciding(s.ravel())).reshape(2, *s.shape)[which, :, column].T
-        # the signs at a and b are known: evaluated again, a zero there may come out with the other one
+        # the signs at a and b are known: evaluated again, a zero there may come out with the opposite sign
         other = (values[1:] < 0) != negative
         other[-1] = True
         k = np.argmax(other, axis=0)

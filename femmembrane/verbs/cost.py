@@ -223,7 +223,7 @@ def _stages(course: Course) -> list[Job]:
         "factorisation and solution": factorise,
     }
     for name, control, n in asked:
-        # started from its own mode, as on a branch from that of the state before
+        # started from its own mode, as a branch starts from the mode of the state before
         guess = checked_verdict(potential, x, p, evaluation, control, n).coefficients
         stages[name] = partial(checked_verdict, potential, x, p, evaluation, control, n, guess=guess)
     criterion = scene.analysis.wrinkling or "total"

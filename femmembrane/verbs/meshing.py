@@ -48,7 +48,7 @@ def on_chosen_mesh(
 
 
 def _carried(start: Equilibrium | None, scene: Scene) -> Equilibrium | None:
-    """A start on another mesh, as a guess: whoever resumes it solves again."""
+    """A start on another mesh, as a guess: it is solved again when it is resumed."""
     if not isinstance(start, Equilibrium):
         return start
     state = transferred(start.potential.space, start.state, potential_of(scene).space)

@@ -22,7 +22,7 @@ from .trace import trace
 UNEXPECTED = "unexpected error"
 #: reference radii at which the smallest stress is looked for
 _RADII = np.linspace(0.0, 1.0, 401)
-#: steps of a trace after which it is asked whether it has met what it is followed for
+#: steps of a trace between two looks at whether it has met what is sought
 _PIECE = 20
 
 #: how the onset of an instability went, beside the numbers of it
@@ -241,5 +241,5 @@ QUANTITIES: Mapping[str, Compute] = {
     "tipping": _tipping,
     "wrinkling": _wrinkling,
 }
-#: those that follow a branch by arc length
+#: quantities that follow a branch by arc length
 TRACED = ("branch", "tipping", "wrinkling")

@@ -12,7 +12,7 @@ suffix   what is in the file                                                 rea
          equilibria or of one
 =======  ==================================================================  ==========================
 
-Lengths are in units of R0, or in m where the scene has scales (in .csv then both); normals point the way the pressure pushes.
+Lengths are in units of R0, or in m where the scene has scales; a .csv then has both. Normals point the way the pressure pushes.
 """
 
 from __future__ import annotations

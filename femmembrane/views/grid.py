@@ -175,7 +175,7 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
 
 
 def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array, plain: Array) -> None:
-    """Shades that span the plain values: those of a branch that ended early, perhaps far away, have the shade of the end they pass."""
+    """Shades that span the plain values. Values of a branch that ended early, perhaps far away, have the shade of the end they pass."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap
 

@@ -46,7 +46,7 @@ def pairs(items: Iterable[tuple[str, Any]]) -> str:
 
 
 def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[list[Any]]]:
-    """Headings and cells of the equilibria of a branch; where there are more than ``most``, so many, evenly spread."""
+    """Headings and cells of the equilibria of a branch: all of them, or ``most`` of them, evenly spread."""
     from ..results.table import columns, estimated, value
 
     names = [name for name in columns(branch) if name not in ("iterations", "seconds")]

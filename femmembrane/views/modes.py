@@ -92,7 +92,7 @@ def render_mode(
     """Draw the equilibrium and, beside it, the membrane at the full amplitude of a mode, without a display.
 
     The colour is the displacement along the normal of the equilibrium, relative to the largest displacement: red the way the pressure
-    pushes, blue against it, grey where the membrane rests or moves within its own surface. Green circles are those of the equilibrium.
+    pushes, blue against it, grey where the membrane rests or moves within its own surface. Green circles belong to the equilibrium.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from ..files import replace_file
 Frame = NDArray[np.uint8]
 
 SUFFIXES = (".gif", ".mp4")
-#: so many frames in all, first and last included, choose the colours of a GIF
+#: number of frames, first and last included, that choose the colours of a GIF
 _SAMPLES = 6
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
 
-#: profile quantities that a file shows as point data, in this order; those in Pa when the scene has scales
+#: profile quantities that a file shows as point data, in this order; quantities in Pa only when the scene has scales
 FIELDS = (
     "stretch_1",
     "stretch_2",
@@ -136,7 +136,7 @@ def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[
 
 
 def write_collection(path: str | PathLike[str], count: int, write_one: Callable[[int, Path], None]) -> list[Path]:
-    """Write numbered VTU files to a folder beside a PVD file, and the PVD file last; those of an earlier, longer collection are removed.
+    """Write numbered VTU files to a folder beside a PVD file, and the PVD file last. Files of an earlier, longer collection are removed.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
 
 
 def shown_length(equilibrium: Equilibrium) -> float:
-    """Length in a file of the unit of length R0: 1, or what it is in m where the scene has scales."""
+    """Length of R0 in a file: 1, or its length in m where the scene has scales."""
     scales = equilibrium.scene.scales
     return 1.0 if scales is None else scales.to_si("length", 1.0)
 

@@ -81,7 +81,7 @@ def zone_label(scene: Scene, kind: str) -> str:
 
 
 def zone_order(label: str) -> int:
-    """Place of a label among those of the kinds of zones; their number for any other label."""
+    """Place of a label among the labels of the kinds of zones. Any other label comes after all of them."""
     return next((k for k, pattern in enumerate(PATTERNS.values()) if label.startswith(pattern.name)), len(PATTERNS))
 
 

@@ -176,7 +176,7 @@ def _add(lines: Lines, tags: NDArray[np.int64], table: NDArray[np.int64], member
 
 
 def _inner_last(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Cells with the point inside last: programs write it second or third, so it is the one that sees the others in opposite directions."""
+    """Cells with the point inside last. Programs write it second or third; seen from it, the two ends lie in opposite directions."""
     corners = points[nodes]
     seen = [((corners[:, (k + 1) % 3] - corners[:, k]) * (corners[:, (k + 2) % 3] - corners[:, k])).sum(axis=1) for k in range(3)]
     inner = np.argmin(seen, axis=0)

@@ -1,7 +1,7 @@
-"""Checks of single values: what arguments and keys of scene files may be, each written once.
+"""Checks of single values, for arguments and for keys of scene files; each check is written once.
 
-A check returns the value in its one true type, or raises :class:`.InputError` with the key and what is allowed. NumPy's numbers are
-numbers; truth values are none.
+A check returns the value in its one true type, or raises :class:`.InputError` with the key and what is allowed. NumPy's numbers count as
+numbers, and truth values do not.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 
 from .errors import InputError, unknown_name
 
-#: largest size of a number in a scene: its powers, as in the field of a dipole, are still numbers, and nothing physical comes near
+#: largest size of a number in a scene: its powers, as in the field of a dipole, are still finite, and no physical number comes near it
 LARGEST = 1e30
-#: what is smaller is 0 to round-off, also where its third root counts
+#: smaller numbers are 0 to round-off, even where their third root counts
 SMALLEST = 1e-100
 #: entries of a list of sources, loads, verdicts or wave numbers
 MAX_ITEMS = 10**4

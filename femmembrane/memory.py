@@ -1,7 +1,7 @@
-"""Room for what is asked for, found out before any of it is built.
+"""Whether the memory has room for a computation, before anything is built.
 
-What a system gives away is not always there when it is used: a process that asks for too much is ended without a word. So the memory that
-a mesh, a run or a sweep takes at least is estimated first, and compared with what this process may still have.
+A system may promise memory that it does not have, and end a process that uses too much without a word. So the least memory of a mesh, a run
+or a sweep is estimated first, and compared with what this process may still have.
 """
 
 from __future__ import annotations

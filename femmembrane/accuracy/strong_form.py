@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 #: the singular matrix S
 SINGULAR: Array = np.array([[0.0, 0, 1, 0], [0, 0, 0, 0], [0, 0, -2, 0], [0, 0, 0, -1]])
-#: imaginary step of the derivatives of the magnetic energy: no difference is taken, so it may be as small as one likes
+#: imaginary step of the derivatives of the magnetic energy: nothing is subtracted, so that it may be tiny
 _STEP = 1e-30
 
 
@@ -185,12 +185,12 @@ class Guess:
 
     @classmethod
     def of(cls, equilibrium: Any) -> Guess:
-        """The guess that a known state is: an :class:`~femmembrane.Equilibrium` or a :class:`Solution`."""
+        """A known state as a guess: an :class:`~femmembrane.Equilibrium` or a :class:`Solution`."""
         profile = equilibrium.profile()
         return cls(equilibrium.pressure, equilibrium.center_height, float(profile["stretch_1"][0]), profile)
 
     def beyond(self, before: Guess, factor: float = 1.0) -> Guess:
-        """Linear extrapolation: as far again, times ``factor``, as from ``before`` to here; profiles on the same radii."""
+        """Linear extrapolation from ``before`` through this solution, by ``factor`` times their distance; profiles on the same radii."""
 
         def along(name: str) -> float:
             return float(getattr(self, name) + factor * (getattr(self, name) - getattr(before, name)))
@@ -204,7 +204,7 @@ class Guess:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What a method that is independent of the finite elements found.
+    """The answer of a method that is independent of the finite elements.
 
     Attributes
     ----------

@@ -58,7 +58,7 @@ class NumpyElements:
     def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
         out = self._point.replay(self._space.at_quadrature(x), np.array([pressure, factor]))
         densities = out[N_SUMS:]
-        with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy NaN is the answer, and the caller's to judge
+        with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy the answer is NaN, which the caller judges
             elastic, magnetic, volume = out[:N_SUMS].sum(axis=1).tolist()
             gradients = self._space.assemble_vectors(densities[:N_FORCE].reshape(self._force_shape))
         finite = bool(np.isfinite(gradients).all() and np.isfinite(densities[N_FORCE : N_FORCE + N_STIFFNESS]).all())
@@ -137,9 +137,9 @@ def _pinned_count(band: Array, kd: int, constraint: Array | None, compliance: fl
 
 @lru_cache(maxsize=64)
 def _spread(n: int, count: int) -> np.ndarray:
-    """Unknowns to pin, spread evenly; the first ones belong to the pole.
+    """Unknowns to pin, spread evenly. The first of them belong to the pole.
 
-    Many are pinned in pairs of neighbours, u and w of one node: evenly spaced ones may all be of one kind, and leave the other free.
+    Many unknowns are pinned in pairs, u and w of one node: evenly spaced unknowns may all be of one kind, and leave the other kind free.
     """
     if count <= 4:
         return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)

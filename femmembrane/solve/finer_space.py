@@ -22,7 +22,7 @@ from .state import State, distance
 
 #: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
 FAR = 0.2
-#: spaces, each finer than the one before, in which a doubtful answer is looked at again
+#: number of spaces, each finer than the last, in which a doubtful answer is checked
 LEVELS = (1, 2)
 #: relative residual above which a state is no equilibrium, so that no state of another space stands for it
 _BALANCED = 1e-6
@@ -53,7 +53,7 @@ def solved_in(
 
 
 def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> NewtonResult:
-    """Where the branch of another space crosses the plane through a point of a branch, across its tangent: regular at every fold."""
+    """Where the branch of another space crosses the plane through a point of a branch, across its tangent; regular at every fold."""
     state = point.state
     start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
     dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / (onto.area * onto.space.unit**2)
@@ -63,7 +63,9 @@ def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> New
 
 
 def solved_past_folds(onto: Potential, control: Control, potential: Potential, state: State) -> NewtonResult:
-    """As :func:`solved_in`, for a state next to a fold of the control: the branch is :func:`met_across` first, and then followed to it."""
+    """As :func:`solved_in`, for a state next to a fold of the control. The branch is :func:`met_across` first, and then followed to the
+    state.
+    """
     result = met_across(onto, potential, first_point(potential, state, 1))
     if result.status is not Status.CONVERGED:
         return result

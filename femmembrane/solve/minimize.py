@@ -170,7 +170,7 @@ def _on_branch_of_guess(
 ) -> NewtonResult:
     """The minimiser's state, or the state that Newton's method finds from the guess if this is another one and nearer.
 
-    Where its branch is unstable a minimiser goes downhill to another one, or stays on it: round-off and the mesh decide which.
+    Where the branch is unstable a minimiser may stay on it, or go downhill to another branch: round-off and the mesh decide.
     """
     own = correct(potential, control, x, pressure, magnetic=magnetic)
     if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * distance(potential, found.x, np.zeros_like(x)):

@@ -92,7 +92,7 @@ def correct(
         stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if stalled and size <= 100 * SOFT and not done:
             before, unbalance = unbalance, equations.residual
-            # along a soft direction corrections are round-off while forces still come into balance, or stay all but balanced
+            # along a soft direction corrections are round-off, while the forces are balanced or still come into balance
             stalled = unbalance > max(1e-2 * before, NEARLY_BALANCED * potential.space.slenderness)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
@@ -139,7 +139,7 @@ class Equations:
 
     @property
     def on_control(self) -> bool:
-        """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
+        """Whether the control is met to round-off of its own terms. Arc length always counts as met: its value is nobody's target."""
         if isinstance(self.control, ArcLengthControl):
             return True
         terms = float(abs(self._row @ self.x) + abs(self._corner * self.pressure))
@@ -147,7 +147,7 @@ class Equations:
 
     @property
     def at_round_off(self) -> bool:
-        """Whether no correction can be told from round-off: forces balance as far as positions are known, and the control is met."""
+        """Whether corrections are round-off: forces balance as far as positions are known, and the control is met."""
         return self.residual <= ROUND_OFF * self.potential.space.slenderness and self.on_control
 
     @property
@@ -171,7 +171,9 @@ class Equations:
         return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
     def newton_step(self) -> tuple[Array, float]:
-        gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
+        gap = (
+            self.gap if abs(self.gap) > self._round_off else 0.0
+        )  # next to rest the correction would move the membrane by more than its displacement
         return self._factored.solve(self.unbalanced, -gap)
 
     def size(self, dx: Array) -> float:

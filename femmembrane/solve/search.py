@@ -126,7 +126,7 @@ class Search:
                 self._halves += [(crossing, 1), (crossing, -1)]
 
     def _on_traced_branch(self, state: State) -> bool:
-        """Whether a state lies between two traced points of nearly the same shape: a start on a known branch is not traced again."""
+        """Whether a state lies between two traced points of nearly the same shape. A start on a known branch is not traced again."""
         reach = 0.5 * (self.potential.space.units["volume"] + abs(state.volume))
         near = [p for p in self._points if abs(p.state.volume - state.volume) < reach]
         scale = distance(self.potential, state.x, np.zeros_like(state.x))
@@ -137,7 +137,7 @@ class Search:
         return False
 
     def _add(self, state: State) -> bool:
-        """Keep a state unless it is known; one that is ill-posed or not resolved is a shape of this mesh, remembered only to be avoided."""
+        """Keep a state unless it is known. An ill-posed or unresolved state depends on the mesh: it is remembered only to be avoided."""
         if self._known(state.x):
             return False
         kept = self.states
@@ -208,7 +208,7 @@ class Search:
 
 
 def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator[Segment]:
-    """Segments of a branch until a step fails, the limit is reached, or a tension field is slack, beyond which states depend on the mesh."""
+    """Segments of a branch until a step fails, the limit is reached, or a tension field is slack and depends on the mesh."""
     tracer = Tracer(Predictor(), StepControl().first, StepControl())
     points = trace_points(potential, point, tracer)
     for _ in range(max_steps):
@@ -250,11 +250,11 @@ def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
 
 @dataclass(slots=True)
 class Limit:
-    """Why a load cannot be reached: the fold where the branch turns back, or the branch point from which on it is unstable, and the next
-    stable state at the load, if there is one.
+    """Why a load cannot be reached: the fold where the branch turns back, or the branch point where it becomes unstable. With it comes the
+    next stable state at the load, if there is one.
 
-    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became so, slack or compressed,
-    before either was met: what follows is the mesh's.
+    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became slack or compressed before
+    either was met. What follows depends on the mesh.
     """
 
     fold: Located | None
@@ -273,9 +273,8 @@ def beyond_limit(
     any_before: bool = False,
     max_steps: int = 300,
 ) -> Limit:
-    """Follow the branch from the last state before a load that was not reached by steps in the load itself.
-
-    So close to a fold such steps can fail on this side of it: then there is a landing and no fold.
+    """Follow the branch from the last state before a load that was not reached by steps in the load itself. Close to a fold such steps can
+    fail on this side of it: then there is a landing and no fold.
 
     Parameters
     ----------
@@ -321,7 +320,7 @@ def beyond_limit(
 def beyond_crossing(
     potential: Potential, located: Located, quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
 ) -> State | None:
-    """The first stable state at a load on the other branch at a branch point; None where neither half has one."""
+    """The first stable state at a load on the branch that crosses at a branch point; None if neither half has one."""
     try:
         crossing = crossing_at(potential, located.point)
     except SolveError:

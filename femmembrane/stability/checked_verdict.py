@@ -59,7 +59,7 @@ def checked_verdict(
     ask = partial(_verdict, control=control, azimuthal=azimuthal, compliance=compliance)
     try:
         verdict = ask(potential, x, pressure, evaluation, guess=guess)
-    except SpectrumError as error:  # one verdict that cannot be proved must not cost the run that asked for it
+    except SpectrumError as error:  # a verdict that cannot be proved must not end the run that asked for it
         return Verdict(None, np.nan, np.nan, control, azimuthal, None, f"not decided: {error}")
     value = abs(verdict.smallest_eigenvalue)
     if value < max(small_eigenvalue(potential.space), _CLEAR * verdict._unresolved):  # never for NaN
@@ -90,11 +90,12 @@ def _with_discretisation_error(
 ) -> Verdict:
     """Solve again on elements of one degree more (or half the size). The change of an eigenvalue decides whether its sign is known.
 
-    Where the sign stays open although the mesh is too coarse to call it zero, a still finer space is tried; what it settles is reported.
+    The sign may stay open although the mesh is too coarse to call the eigenvalue zero. A still finer space is then tried, and its answer is
+    reported.
     """
     value, unknown = verdict.smallest_eigenvalue, _CLEAR * verdict._unresolved
     better = _finer_verdict(verdict, potential, pressure, evaluation, ask, 1)
-    if better is None:  # nothing to compare with: the part that is not resolved stands for the error
+    if better is None:  # there is nothing to compare with: the unresolved part stands for the error
         return verdict if abs(value) >= unknown else _open(verdict, unknown)
     change = abs(better.smallest_eigenvalue - value)
     error, hidden = verdict.error + SAFETY * change, abs(value) <= verdict._unresolved
@@ -125,7 +126,7 @@ def _finer_verdict(
     verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict], level: int
 ) -> Verdict | None:
     """The same question about the same state in a finer space, the mode interpolated; None where there is no answer."""
-    # held is the volume, unless this eigenvalue vanishes at its folds
+    # the volume is held, unless this eigenvalue vanishes at volume folds
     at_fold = verdict.control == "volume" and abs(verdict.smallest_eigenvalue) < small_eigenvalue(potential.space)
     found = counterpart(potential, evaluation, pressure, "pressure" if at_fold else "volume", level)
     if found is None:

@@ -26,7 +26,7 @@ FINITE = "a finite number is allowed"
 
 
 def as_float(value: object) -> float:
-    """A value as a float; NaN for what is no number, as truth values are none, and infinity for what no float can hold."""
+    """A value as a float; NaN for anything but a number (truth values included), and infinity for numbers beyond the range of a float."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
@@ -36,7 +36,7 @@ def as_float(value: object) -> float:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number, NumPy's included; truth values are none."""
+    """Whether a value is a finite number, NumPy's included. Truth values are not."""
     return math.isfinite(as_float(value))
 
 
@@ -50,7 +50,7 @@ def is_whole(value: object, least: int = 1, most: int | None = None) -> bool:
 def number(
     key: str, value: object, allowed: str = FINITE, *, least: float = -math.inf, above: float = -math.inf, most: float = LARGEST
 ) -> float:
-    """A finite number as a float, whatever type it comes in; one that is 0 to round-off, -0 included, is 0.
+    """A finite number of any type as a float. A number that is 0 to round-off, -0 included, becomes 0.
 
     Parameters
     ----------

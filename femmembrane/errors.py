@@ -129,7 +129,7 @@ def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
 
 
 def printable(text: str) -> str:
-    """A text that may be written to a terminal: what could move its cursor, or do worse, is spelled out (\\x1b)."""
+    """A text that may be written to a terminal: control characters, which could move its cursor, are spelled out (\\x1b)."""
     return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 

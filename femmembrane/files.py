@@ -45,7 +45,7 @@ _OWN = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NO
 
 
 def read_bytes(path: str | os.PathLike[str], most: int = -1) -> bytes:
-    """What is in a file, or its first ``most`` bytes; a pipe is refused, for it may never end.
+    """The content of a file, or its first ``most`` bytes. A pipe is refused, since it may never end.
 
     Raises
     ------
@@ -161,12 +161,12 @@ def _abandoned(path: str) -> bool:
 
 
 def lock(descriptor: int) -> bool | None:
-    """Lock a file until it is closed: whether that went well, None on a file system that knows no locks."""
+    """Lock a file until it is closed. Answers whether that succeeded, or None on a file system without locks."""
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            # one byte far behind what is written, so that others may read who holds the file
+            # one byte far behind the text, so that others can read who holds the file
             os.lseek(descriptor, 1 << 30, os.SEEK_SET)
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         else:
@@ -201,7 +201,7 @@ def own_file(path: Path) -> int:
 
 
 def refuse_strange(path: Path) -> None:
-    """Refuse to write in place to anything but a regular file with one name; there may be none yet.
+    """Refuse to write in place to anything but a regular file with one name. The file need not exist yet.
 
     Raises
     ------

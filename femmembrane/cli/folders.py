@@ -57,7 +57,7 @@ def _bundled(name: str) -> Path:
 def working(out: Path, names: Iterable[str] = (), folders: Iterable[str] = ()) -> Iterator[None]:
     """Hold a folder for results. It is made if it does not exist, and tried before hours are spent on results that could not be kept.
 
-    What a killed command left unfinished in it is removed; if nothing is written to a folder that was made here, it goes again.
+    Unfinished files of a killed command are removed. A folder that was made here goes again if nothing is written to it.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def working(out: Path, names: Iterable[str] = (), folders: Iterable[str] = ()) -
 
 
 def _make(out: Path) -> list[Path]:
-    """Make the folder, and write to it once; the folders that were not there before, the innermost first."""
+    """Make the folder, and write to it once. Answers the folders that were made, the innermost first."""
     import tempfile
 
     made: list[Path] = []

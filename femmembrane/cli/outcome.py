@@ -35,7 +35,7 @@ def say(text: str) -> None:
 
 
 def _write(stream: TextIO, text: str) -> None:
-    """The one way in which text that may come from files and options goes to a terminal."""
+    """Write text to a terminal. Text that may come from files and options goes no other way."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     stream.write(printable(text).encode(encoding, "backslashreplace").decode(encoding))
 
@@ -43,7 +43,7 @@ def _write(stream: TextIO, text: str) -> None:
 def open_streams() -> None:
     """Streams that were closed before the process started lead nowhere. A file that is opened later cannot take their place.
 
-    What cannot be encoded for the reader of the output is written as an escape.
+    A character that the output cannot encode is written as an escape.
     """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         if getattr(sys, name) is not None:
@@ -61,7 +61,7 @@ def open_streams() -> None:
 
 
 def drop(stream: TextIO) -> None:
-    """Whatever a stream still holds leads nowhere, where Python would complain again when it flushes at its end."""
+    """Drop what a stream still holds: Python would complain again when it flushes at its end."""
     try:
         number = stream.fileno()
     except (OSError, ValueError):  # a stream of Python alone

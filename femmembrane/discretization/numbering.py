@@ -108,7 +108,7 @@ class Numbering:
         self.points: Array = points[0]
 
     def _support(self, n_nodes: int) -> None:
-        """What holds the ends, what closes the volume there, and what is done about rigid motions."""
+        """Find what holds the ends, what closes the volume there, and how rigid motions are kept out."""
         self.supports = tuple(as_support(held) for held in self.mesh.supports())
         self.closed = not self.supports
         R, Z = self.mesh.position(self.ends[[0, -1]])
@@ -126,7 +126,7 @@ class Numbering:
         self.lids = adrift or not all(in_plane)
         shift, tilt = free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
         self.rotations = (shift and "shift" not in self.anchored, tilt and "tilt" not in self.anchored)
-        radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
+        radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element need not be values
         if not radius.max() > 0:
             raise InputError("mesh.elements", self.n_elements, "a meridian from pole to pole needs 2 or more elements")
         middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
@@ -155,7 +155,7 @@ class Numbering:
         if self.pin is not None:
             free[self.nodes[self.pin], 1] = False
         self.n_free = int(free.sum())
-        # one spare slot past the end stands for all that is held at zero
+        # one spare slot past the end stands for everything that is held at zero
         numbers: NDArray[np.int64] = np.full((self.n_nodes, 2), self.n_free, dtype=np.int64)
         numbers[free] = np.arange(self.n_free)
         self.numbers = numbers
@@ -250,7 +250,7 @@ class Numbering:
 
 
 def band_of(gather: NDArray[np.int64], n_free: int) -> int:
-    """Half bandwidth that the unknowns of the elements, one column each, leave; those numbered ``n_free`` are none."""
+    """Half bandwidth of the unknowns of the elements, one column each. The number ``n_free`` stands for no unknown."""
     inside = gather < n_free
     low, high = np.where(inside, gather, n_free).min(axis=0), np.where(inside, gather, -1).max(axis=0)
     return int((high - low).max(initial=0))

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ..checks import choice, number, sequence, sign, store, whole
 from ..errors import InputError
 
-#: words of [run].control and the quantity that each prescribes, by its public name; arc length prescribes none
+#: words of [run].control, and the public name of the quantity that each prescribes; arc length prescribes none
 PRESCRIBED = {"volume": "volume", "pressure": "pressure", "height": "center_height"}
 CONTROLS = (*PRESCRIBED, "arc-length")
-#: quantities that a minimiser can hold; the height of the pole is held by no potential
+#: quantities that a minimiser can hold; no potential holds the height of the pole
 MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")

@@ -198,7 +198,7 @@ class _Study:
     def _floors(
         self, fine: Equilibrium, others: Sequence[Equilibrium], reference: dict[str, float]
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """What errors are relative to, and the error of the reference in that measure."""
+        """Divisors of relative errors, and the error of the reference over the same divisors."""
         scale: dict[str, float] = {}
         floors: dict[str, float] = {}
         measured = [self.measured(eq) for eq in others]

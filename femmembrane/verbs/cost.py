@@ -257,7 +257,7 @@ def _job(line: Measurement, name: str, act: Callable[[], Any]) -> Job:
 
 
 def _effects(course: Course) -> list[Job]:
-    """One load step by Newton with its record, without and with each effect, everything else as in the scene."""
+    """One load step by Newton's method with its record, without and with each effect. Everything else is as in the scene."""
     plain = course.scene.replace(run=None, analysis=Analysis(), tension_field=False)
     modes = course.scene.analysis.azimuthal_modes or (1,)
     pairs: dict[str, tuple[Scene, Scene]] = {}
@@ -278,7 +278,7 @@ def _recorded(course: Course, scene: Scene) -> Callable[[], Outcome]:
     potential = potential_of(scene)
     try:
         again = course.step(potential, cold_start(potential, course.control, course.loads[0]))
-        previous = record(scene, potential, again("newton", potential))  # lends its modes as the state before does on a branch
+        previous = record(scene, potential, again("newton", potential))  # lends its modes, as the state before does on a branch
     except SolveError as error:
         message = str(error)
         return lambda: Outcome(converged=False, message=message)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 #: called with the number of scenes that are done, the number of all scenes, and the number of done scenes without a result
 OnScene = Callable[[int, int, int], None]
-#: where finished scenes are kept in the folder of a sweep
+#: name of the file with the finished scenes, in the folder of a sweep
 KEPT = "scenes.sqlite"
 #: seconds for which a sweep works in one process, about as long as it takes to start others
 _ALONE = 2.0
@@ -242,11 +242,11 @@ def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
 
 
 def _key(scene: Scene, quantity: str, options: Options) -> str:
-    """The hash of all that a row depends on; a title is not part of it."""
+    """The hash of everything that a row depends on. The title plays no part."""
     from .. import __version__
 
     tables = {name: table for name, table in scene.to_dict().items() if name != "title"}
-    # rows of membranes with their inside above were kept with other signs before
+    # earlier versions kept rows of membranes with their inside above with other signs
     signs = ["inside above"] if side(scene.mesh) < 0 else []
     text = json.dumps([_canonical(tables), quantity, _canonical(asdict(options)), __version__, *signs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()

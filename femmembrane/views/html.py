@@ -57,7 +57,7 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
 
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
-    """What an equilibrium is, with the verdicts that its scene asks for."""
+    """The numbers of an equilibrium, with the verdicts that its scene asks for."""
     analysis = equilibrium.scene.analysis
     energies = [("elastic energy", equilibrium.elastic_energy)]
     energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 SHOWN = 0.15
 #: sectors around the axis for each wave, so that short waves stay round
 _PER_WAVE = 12
-#: horizontal and vertical in the picture, as the camera of :func:`render_mode` looks
+#: the horizontal and the vertical of the picture, as the camera of :func:`render_mode` looks
 _TO_THE_RIGHT, _UPWARD = np.array([1.0, 0.3, 0.0]) / np.hypot(1.0, 0.3), np.array([0.0, 0.0, 1.0])
 #: colour of the equilibrium's lines
 _REST = "#4a8f4a"
@@ -189,7 +189,7 @@ def _draw(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
 
 
 def set_up_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
-    """What does not move: the key, and a camera that sees the whole motion."""
+    """Draw what does not move: the key, and a camera that sees the whole motion."""
     _draw_key(plotter, surface, position_x=0.58)
     low = surface.rest - 0.3 * surface.extent * _UPWARD
     moved = [surface.rest + sign * surface.displacement for sign in (1, -1)]
@@ -197,7 +197,7 @@ def set_up_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
 
 
 def draw_moved(plotter: pyvista.Plotter, surface: ModeSurface, part: float) -> None:
-    """The membrane at a part, -1 to 1, of the amplitude beside the circles of the equilibrium, in place of the one drawn before."""
+    """Draw the membrane at a part, -1 to 1, of the amplitude beside the circles of the equilibrium, in place of the last one."""
     moved = surface.rest + part * surface.displacement
     coloured = polydata(surface.revolution, moved)
     coloured.point_data["normal"] = part * surface.normal

@@ -1,4 +1,4 @@
-"""What stands in a picture beside the membrane, before anything is drawn: bodies of sources, and where the membrane is held.
+"""Surroundings of the membrane in a picture, before anything is drawn: bodies of sources, and where the membrane is held.
 
 Sources are asked for their :class:`~femmembrane.physics.outline.Outline`, and the mesh for its supports. The kinds of sources and shapes
 are not known here. Pictures in the plane and in space show the same.
@@ -50,7 +50,7 @@ class Box:
 
     @property
     def size(self) -> float:
-        """Its larger side, both halves of the membrane taken together."""
+        """The larger side of the box, with both halves of the membrane."""
         return max(2 * self.radius, self.high - self.low)
 
 
@@ -117,6 +117,6 @@ def _cut(body: Outline, box: Box) -> Outline:
 
 
 def _distance(body: Outline, box: Box) -> float:
-    """From the nearest corner of the body to the box."""
+    """Distance from the nearest corner of the body to the box."""
     rho, z = np.array(body.points).T
     return float(np.min(np.hypot(np.maximum(rho - box.radius, 0), np.maximum(np.maximum(box.low - z, z - box.high), 0))))

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
     from ..results.records import Branch, Equilibrium
 
-#: of a window and a picture, and of a movie, whose frames take a quarter of a second each without a graphics card
+#: sizes of a window and a picture, and of a movie; its frames take a quarter of a second each without a graphics card
 SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
 #: most frames of a movie of a branch, and frames of one period of a mode
 _MOST, _PERIOD = 90, 30
 _RATE = 12.0
-#: seconds for which the last step of a branch stays, and the picture of a window between two phases of a mode, in milliseconds
+#: seconds for which the last step of a branch stays; milliseconds between two phases of a mode in a window
 _HOLD, _PAUSE = 1.5, 50
 
 

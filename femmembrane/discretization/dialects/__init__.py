@@ -43,7 +43,7 @@ class UnreadableError(Exception):
 
 
 def printable(text: str) -> str:
-    """A text from a file without what would move the cursor of a terminal, or worse."""
+    """A text from a file without control characters, which could move the cursor of a terminal, or worse."""
     return "".join(c if c.isprintable() else "?" for c in text)
 
 

@@ -90,7 +90,7 @@ def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]
             raise InputError("scheduler", address, f"its workers need femmembrane {_version()} ({error})") from None
         if found != {_version()}:
             allowed = (
-                f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, or rows would hang on who computes them"
+                f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, so that rows do not depend on who computes them"
             )
             raise InputError("scheduler", address, allowed)
         with client.get_executor(pure=False) as executor:

@@ -236,5 +236,5 @@ def _values(quantity: str, value: Any) -> Array:
 
 def _converted(value: Any, given: Array, result: Any) -> float | Array:
     if (np.isinf(result) & np.isfinite(given)).any():
-        raise InputError("value", value, "a value is allowed whose size in the other unit is in the range of a float")
+        raise InputError("value", value, "a value is allowed that a float can hold in the other unit as well")
     return result if np.ndim(result) else float(result)

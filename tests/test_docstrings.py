@@ -126,7 +126,7 @@ def test_main_names_are_public():
 
 @pytest.mark.parametrize("path", sorted(CALLABLES))
 def test_parameters_are_listed(path):
-    """All parameters of the signature and no others, in their order unless they are given by name alone; those of records as attributes."""
+    """All parameters of the signature and no others, in order unless they are given by name alone. Records list them as attributes."""
     thing, wanted = CALLABLES[path], parameters(CALLABLES[path])
     found = [listed(text, title) for text in descriptions(path) for title in ("Parameters", "Attributes")]
     if inspect.isclass(thing) and dataclasses.is_dataclass(thing):

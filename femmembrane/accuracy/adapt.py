@@ -335,7 +335,7 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
     if trial is None:
         raise failure
     if not len(trial.errors):
-        message = f"mesh.accuracy = {_accuracy(scene):g}: no error can be estimated at any state of the run, since all of them depend on the mesh"
+        message = f"mesh.accuracy = {_accuracy(scene):g}: no error can be estimated, since all states of the run depend on the mesh"
         raise SolveError(message, status=Status.ACCURACY_NOT_MET)
     return trial
 

@@ -89,9 +89,7 @@ def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]
         except ImportError as error:
             raise InputError("scheduler", address, f"its workers need femmembrane {_version()} ({error})") from None
         if found != {_version()}:
-            allowed = (
-                f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, so that rows do not depend on who computes them"
-            )
+            allowed = f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, so that all compute the same rows"
             raise InputError("scheduler", address, allowed)
         with client.get_executor(pure=False) as executor:
             yield from _drive(executor, tasks, {}, lambda: max(16, 4 * sum(client.nthreads().values())))

@@ -9,7 +9,7 @@ For states on both sides of limit points of four scenes, with and without a dipo
     python demos/jacobi_table.py                table in out/jacobi_table, 10 seconds
 
 Sources: the tests are equations 40 and 42 to 45 of Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), the three-term Ogden
-material its table 1. The eigenvalues asserted at the end are those of an independent spectral Ritz solver.
+material its table 1. The eigenvalues asserted at the end come from an independent spectral Ritz solver.
 """
 
 from __future__ import annotations

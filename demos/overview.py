@@ -2,13 +2,13 @@
 
 A three-term Ogden disc (susceptibility 2.5) is inflated below a dipole of strength M = 200 at height h = 6.5. Its branch is followed by arc
 length from V = 0.1 past three limit points (dP = 0) and a fold of the volume (dV = 0) to a pole height of 5.2, close below the dipole:
-the first two limit points are those of every rubber balloon, the third and the fold are the dipole's pull. On the right the membrane at
+every rubber balloon has the first two limit points; the third and the fold come from the pull of the dipole. On the right the membrane at
 V = 75, as seen from the side.
 
     python demos/overview.py                    picture and tables in out/overview, 6 seconds
 
 Sources: material and scene from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1 and figure 4. The special points
-asserted at the end are those of an independent spectral Ritz solver, converged to more digits than are given.
+asserted at the end come from an independent spectral Ritz solver, converged to more digits than are given.
 """
 
 from __future__ import annotations

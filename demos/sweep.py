@@ -13,7 +13,7 @@ down from V = 3, tip over sideways (below only).
 Finished scenes are kept in the folder, so that a second call only draws. At the end a line of scenes at h = -3.5 is checked against the
 cusps of the fold curve: two limit points are born at M = 471.86, and two merge at M = 875.91.
 
-Sources: material from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1; the cusps are those of `fm.fold_curve`.
+Sources: material from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1; the cusps come from `fm.fold_curve`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ area that is wrinkled by the criterion that the energy itself feels (mechanical)
     python demos/tension_field.py                  tables and picture in out/tension_field, 10 seconds
 
 Sources: material and scenes from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1 and figures 7 to 9. The pressures
-and volumes asserted at the end are those of an independent solver (shooting from the pole, stopping where zones of wrinkles end).
+and volumes asserted at the end come from an independent solver (shooting from the pole, stopping where zones of wrinkles end).
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ which on the membrane stands upright.
 
 Frequencies are in units of sqrt(mu/(rho_m R0^2)), with the volume held for 0 waves; directions that depart have a growth rate instead.
 
-Sources: material from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1. The eigenvalues asserted at the end are
-those of an independent spectral Ritz solver; the height of the onset was recorded here, and agrees between two meshes.
+Sources: material from Saxena, Reddy & Pradhan, Int. J. Non-Linear Mech. 116 (2019), table 1. The eigenvalues asserted at the end come from
+an independent spectral Ritz solver; the height of the onset was recorded here, and agrees between two meshes.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from .threads import WHOLE
 
-    with WHOLE:  # a process that is forked in the middle of an import could never make it
+    with WHOLE:  # a process that is forked in the middle of an import could never finish the import
         value = _imported(name)
     globals()[name] = value
     return value

@@ -1,7 +1,7 @@
-"""Checks of single values: what arguments and keys of scene files may be, each written once.
+"""Checks of single values, for arguments and for keys of scene files; each check is written once.
 
-A check returns the value in its one true type, or raises :class:`.InputError` with the key and what is allowed. NumPy's numbers are
-numbers; truth values are none.
+A check returns the value in its one true type, or raises :class:`.InputError` with the key and what is allowed. NumPy's numbers count as
+numbers, and truth values do not.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 
 from .errors import InputError, unknown_name
 
-#: largest size of a number in a scene: its powers, as in the field of a dipole, are still numbers, and nothing physical comes near
+#: largest size of a number in a scene: its powers, as in the field of a dipole, are still finite, and no physical number comes near it
 LARGEST = 1e30
-#: what is smaller is 0 to round-off, also where its third root counts
+#: smaller numbers are 0 to round-off, even where their third root counts
 SMALLEST = 1e-100
 #: entries of a list of sources, loads, verdicts or wave numbers
 MAX_ITEMS = 10**4
@@ -26,7 +26,7 @@ FINITE = "a finite number is allowed"
 
 
 def as_float(value: object) -> float:
-    """A value as a float; NaN for what is no number, as truth values are none, and infinity for what no float can hold."""
+    """A value as a float; NaN for anything but a number (truth values included), and infinity for numbers beyond the range of a float."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
@@ -36,12 +36,12 @@ def as_float(value: object) -> float:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite number, NumPy's included; truth values are none."""
+    """Whether a value is a finite number, NumPy's included. Truth values are not."""
     return math.isfinite(as_float(value))
 
 
 def is_whole(value: object, least: int = 1, most: int | None = None) -> bool:
-    """Whether a value is a whole number between two bounds, both included; 4.0 is none."""
+    """Whether a value is a whole number between two bounds, both included. 4.0 is not."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         return False
     return bool(least <= value and (most is None or value <= most))
@@ -50,7 +50,7 @@ def is_whole(value: object, least: int = 1, most: int | None = None) -> bool:
 def number(
     key: str, value: object, allowed: str = FINITE, *, least: float = -math.inf, above: float = -math.inf, most: float = LARGEST
 ) -> float:
-    """A finite number as a float, whatever type it comes in; one that is 0 to round-off, -0 included, is 0.
+    """A finite number of any type as a float. A number that is 0 to round-off, -0 included, becomes 0.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def choice(key: str, value: Any, known: Iterable[str]) -> str:
 
 
 def only(owner: str, given: Mapping[str, Any], allowed: str) -> tuple[str, Any]:
-    """The one argument that is given out of several of which exactly one must be.
+    """The name and value of the one argument that is given, out of several that exclude each other.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def only(owner: str, given: Mapping[str, Any], allowed: str) -> tuple[str, Any]:
 
 
 def sequence(key: str, values: Any, allowed: str, most: int = MAX_ITEMS) -> tuple[Any, ...]:
-    """The entries of a list or another iterable as a tuple; a text or a mapping is none.
+    """The entries of a list or another iterable as a tuple. Texts and mappings are refused.
 
     Parameters
     ----------

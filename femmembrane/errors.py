@@ -1,7 +1,7 @@
 """What can go wrong, in words that say what to do next.
 
-Two families: :class:`InputError` for a scene that cannot be built, and :class:`SolveError` for a scene that was built but whose
-equilibrium could not be found. Nothing in the library raises a bare exception for either.
+There are two families: :class:`InputError` for a scene that cannot be built, and :class:`SolveError` for an equilibrium that was not found.
+Nothing in the library raises a bare exception for either.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
 
-#: control characters but for tabs and line ends, separators of lines that are none, and halves of characters
+#: control characters except tabs and line ends, Unicode's own line separators, and halves of characters
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 class Status(StrEnum):
-    """How a solve ended; :attr:`advice` says what to do about it."""
+    """How a solve ended; :attr:`advice` says what to do about it.
+
+    A status is also its text: ``branch.status == "converged"``.
+    """
 
     CONVERGED = "converged"
     NOT_CONVERGED = "not converged"
@@ -90,8 +93,9 @@ class InputError(FemmembraneError, ValueError):
 class SolveError(FemmembraneError, RuntimeError):
     """An equilibrium that could not be found; carries what was reached.
 
-    Attributes
+    Parameters
     ----------
+    message : str
     status : Status
     result : object or None
         The last good result (an equilibrium, or the branch up to the failure).
@@ -125,7 +129,7 @@ def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
 
 
 def printable(text: str) -> str:
-    """A text that may be written to a terminal: what could move its cursor, or do worse, is spelled out (\\x1b)."""
+    """A text that may be written to a terminal: control characters, which could move its cursor, are spelled out (\\x1b)."""
     return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 

@@ -1,7 +1,7 @@
 """How files are opened: only regular ones, never through a link when they are written, and with a digest where damage would pass unseen.
 
-A file that is written has a name that nobody else can guess until it is whole (:func:`claimed`); it is locked meanwhile, so that
-what a killed process left behind can be told from what a living one is still writing (:func:`remove_leftovers`).
+Until it is whole, a file has a name that nobody else can guess (:func:`claimed`). It is locked meanwhile: so the leftovers of a killed
+process can be told from a file that a living process is still writing (:func:`remove_leftovers`).
 
 A sealed file ends in a digest of all that stands before it (:func:`sealed`). HDF5 ignores what follows its data, so that every reader of
 NetCDF opens such a file as any other.
@@ -45,7 +45,7 @@ _OWN = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NO
 
 
 def read_bytes(path: str | os.PathLike[str], most: int = -1) -> bytes:
-    """What is in a file, or its first ``most`` bytes; a pipe is refused, for it may never end.
+    """The content of a file, or its first ``most`` bytes. A pipe is refused, since it may never end.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def write_csv(path: str | os.PathLike[str], header: Sequence[str], rows: Iterabl
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the files that killed processes had not finished in a folder; those that are being written stay."""
+    """Remove the unfinished files of killed processes from a folder. Files that are being written stay."""
     with suppress(OSError):
         for entry in list(os.scandir(folder)):
             if _LEFTOVER.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
@@ -161,12 +161,12 @@ def _abandoned(path: str) -> bool:
 
 
 def lock(descriptor: int) -> bool | None:
-    """Lock a file until it is closed: whether that went well, None on a file system that knows no locks."""
+    """Lock a file until it is closed. Answers whether that succeeded, or None on a file system without locks."""
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            # one byte far behind what is written, so that others may read who holds the file
+            # one byte far behind the text, so that others can read who holds the file
             os.lseek(descriptor, 1 << 30, os.SEEK_SET)
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         else:
@@ -181,7 +181,7 @@ def lock(descriptor: int) -> bool | None:
 
 
 def own_file(path: Path) -> int:
-    """The descriptor of a file that is written in place, made when there is none.
+    """The descriptor of a file that is written in place; the file is made if it does not exist.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def own_file(path: Path) -> int:
 
 
 def refuse_strange(path: Path) -> None:
-    """Refuse to write in place to anything but a regular file with one name; there may be none yet.
+    """Refuse to write in place to anything but a regular file with one name. The file need not exist yet.
 
     Raises
     ------
@@ -238,7 +238,7 @@ def refuse_obstacles(folder: Path, names: Iterable[str], folders: Iterable[str] 
 
 
 def strange(path: Path) -> str:
-    """What has the name of a file and is none, such as "a link"; empty for a regular file, and where there is nothing."""
+    """What stands in the place of a file, in words such as "a link"; empty for a regular file, and where there is nothing."""
     try:
         mode = path.lstat().st_mode
     except OSError:
@@ -247,7 +247,7 @@ def strange(path: Path) -> str:
 
 
 def refuse_no_folder(path: Path, key: str = "path") -> None:
-    """Refuse what has the name of a folder of results and is none, a link to one included: nothing is written or removed elsewhere.
+    """Refuse anything but a folder in the place of a folder of results, also a link to one: nothing is written or removed elsewhere.
 
     Raises
     ------

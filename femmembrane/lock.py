@@ -14,13 +14,13 @@ from .errors import InputError
 from .files import lock, own_file
 
 NAME = ".lock"
-#: how the text in a lock begins; what holds another text is somebody else's file
+#: how the text in a lock begins; a file with another text is not ours
 _HOLDER = b"process "
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder; the system lets go of it when the process ends, however it ends.
+    """Hold a folder. The system lets go of it when the process ends, even after a kill.
 
     On file systems that know no locks nothing is held.
 
@@ -48,7 +48,7 @@ def _hold(path: Path) -> int:
         try:
             free = lock(descriptor)
             os.lseek(descriptor, 0, os.SEEK_SET)
-            text = os.read(descriptor, 200).strip(b"\0")  # which is what a file may hold after the power failed
+            text = os.read(descriptor, 200).strip(b"\0")  # as a file may be after the power failed
             if text and not text.startswith(_HOLDER):
                 raise InputError(
                     "--out", str(path.parent), f"{path.name} in it belongs to something else; remove it, or choose another folder"

@@ -1,7 +1,7 @@
-"""Room for what is asked for, found out before any of it is built.
+"""Whether the memory has room for a computation, before anything is built.
 
-What a system gives away is not always there when it is used: a process that asks for too much is ended without a word. So the memory that
-a mesh, a run or a sweep takes at least is estimated first, and compared with what this process may still have.
+A system may promise memory that it does not have, and end a process that uses too much without a word. So the least memory of a mesh, a run
+or a sweep is estimated first, and compared with what this process may still have.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def available() -> int | None:
 
 
 def require(key: str, count: int, each: int, what: str) -> None:
-    """Raise InputError, with the number that is allowed, unless there is room for so many times so many bytes.
+    """Raise InputError with the number that is allowed, unless there is room for ``count`` items of ``each`` bytes.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def _machine() -> Iterator[int]:
 
 
 def _groups() -> Iterator[int]:
-    """Of the control groups that the process is in, and those around them."""
+    """Of the control groups that the process is in, and of the groups around these."""
     with suppress(OSError, ValueError):
         for line in Path("/proc/self/cgroup").read_text().splitlines():
             _, controllers, name = line.split(":", 2)

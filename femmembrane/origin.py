@@ -1,4 +1,6 @@
-"""What computed: which half of the package, on which processor, with which versions. Others give the same answers to round-off."""
+"""Origin of a result: which half of the package computed it, on which processor, with which versions. Others give the same answers to
+round-off.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,7 @@ def package_version(name: str = "femmembrane") -> str:
 
 
 def processor() -> str:
-    """Its name where the system tells (Linux), or its kind."""
+    """Name of the processor where the system tells it (Linux), or its kind."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
@@ -42,7 +44,7 @@ def origin() -> dict[str, str]:
 
 
 def difference(before: Mapping[str, str], now: Mapping[str, str]) -> str:
-    """What a computation that goes on here, and was begun there, has to say; empty where nothing differs."""
+    """A remark for a computation that was begun elsewhere and goes on here; empty if nothing differs."""
     differing = [name for name in now if before.get(name) != now[name]]
     if not differing:
         return ""

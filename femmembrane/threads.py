@@ -1,10 +1,11 @@
-"""Threads: one for linear algebra on one meridian, and what several of them, and processes forked from among them, may share.
+"""Threads: one for the linear algebra of a meridian, and what several threads and forked processes may share.
 
 The matrices of a meridian are narrow bands and batches of tiny products: handing them to several BLAS threads costs more than the work
 itself, and the order of summation would depend on their number. Every public computation runs under :func:`one_thread`, so that results are
 the same to the last bit however many threads a machine has. Parallelism belongs a level higher, to whole scenes.
 
-A forked process has one thread, and copies of locks that others held, which nobody would ever release: a fork waits until nobody holds one.
+A forked process has one thread. Copies of locks that other threads held would never be released in it. So a fork waits until nobody holds a
+lock.
 """
 
 from __future__ import annotations
@@ -23,9 +24,8 @@ T = TypeVar("T")
 
 
 class _Gate:
-    """Counts the threads that are inside of something which must not be copied half-way; a fork waits for them, and they for it.
-
-    The libraries that solve have locks of their own, which nobody could open in a forked process.
+    """Counts the threads that are inside a section that must not be copied half-way. A fork waits for them, and they wait for the fork. The
+    solver libraries have locks of their own, which nobody could open in a forked process.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class _Gate:
                 self._changed.notify_all()
 
     def close(self) -> None:
-        """Before a fork: nobody else is inside, and nobody enters."""
+        """Before a fork: wait until nobody else is inside, and let nobody enter."""
         with self._changed:
             while self._forking:  # another thread forks
                 self._changed.wait()

@@ -34,9 +34,9 @@ from tests.random_scenes import Draft, draft, scaled_loads
 from tests.walker import Spot, Walker
 
 RECORD = Path(__file__).parent / "data" / "population.json"
-#: pressure or volume on a finer mesh may differ by this part from that of a state that counts as resolved
+#: part by which pressure or volume of a resolved state may change on a finer mesh
 RESOLVED = 1e-3
-#: an answer that moves by more than this on a finer mesh is none
+#: an answer that moves by more than this on a finer mesh does not count
 UNRESOLVED = 3e-2
 #: largest pressure times size of a state that is asked for, and largest volume over the cube of the size
 HIGHEST, LARGEST = 2e3, 1e4
@@ -363,7 +363,7 @@ def _ask(member: Member, control: str, load: Any, solver: str) -> Answer:
 
 
 def judge(member: Member, control: str, load: Any, solver: str, eq: fm.Equilibrium) -> tuple[str, str, bool]:
-    """(verdict, text, whether it is another state than that of the walk) of an equilibrium that was returned."""
+    """(verdict, text, whether the walk has another state) of an equilibrium that was returned."""
     scene = member.scene
     walker = Walker(Potential(scene))
     spot = Spot(np.array(eq.state), eq.pressure, 1.0, walker.evaluate(np.array(eq.state), eq.pressure, 1.0))
@@ -459,7 +459,7 @@ class Report:
 
     @property
     def share(self) -> float:
-        """Of the questions, those that were answered."""
+        """The questions that were answered."""
         return sum(a.good for a in self.answers) / max(len(self.answers), 1)
 
     @property

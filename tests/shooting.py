@@ -6,7 +6,7 @@ Nothing of the package is used. With F = r W*_1 (rho', eta')/lambda_1 the tensio
     (rho', eta') = lambda_1 F/|F|,      where W*_1(lambda_1, lambda_2) = |F|/r,      s^2 = rho^2 + z^2,  z = eta - h,
 
 which is paper eq. 39 as a system of first order. W* = W where the membrane is taut; where it is narrower than its natural width,
-lambda_2 < lambda_1^(-1/2), W*_1 is that of simple tension and W*_2 = 0. The integration stops and starts again at each border between
+lambda_2 < lambda_1^(-1/2), W*_1 belongs to simple tension and W*_2 = 0. The integration stops and starts again at each border between
 the two, so that its order is not lost there.
 """
 

@@ -29,7 +29,7 @@ def text_of(path: Path) -> str:
 
 
 def anchors(text: str) -> set[str]:
-    """Those that a site makes of the headings of a page."""
+    """The anchors that a site makes of the headings of a page."""
     return {re.sub(r"[^\w\- ]", "", line.lstrip("# ").lower()).replace(" ", "-") for line in text.splitlines() if line.startswith("#")}
 
 
@@ -59,7 +59,7 @@ def test_files_that_are_named_exist(page):
 
 
 def registry(name: str) -> dict[str, type]:
-    """A registry of scene files, wherever in their room it stands."""
+    """A registry of scene files, found in any module of their room."""
     import_module("femmembrane.scene")
     rooms = [module for path, module in sys.modules.items() if (path + ".").startswith("femmembrane.scene.")]
     return next(table for table in (getattr(module, name, None) for module in rooms) if isinstance(table, dict))

@@ -24,7 +24,7 @@ FUNCTIONS = ("expm1", "exp", "sin", "cos", "log", "log1p", "arctan", "hypot", "t
 
 @pytest.fixture(params=[-1, 1], ids=["down", "up"])
 def another_processor(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """NumPy's functions as those of a processor that rounds the other way: results that are not exact anyway are moved by one bit."""
+    """NumPy's functions as a processor would compute them that rounds the other way: inexact results are moved by one bit."""
 
     def moved(function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any, **more: Any) -> Any:

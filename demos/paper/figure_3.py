@@ -4,8 +4,8 @@ The paper prints the pressures 1.84, 1.585 and 1.1975 and compares the shapes wi
 Taken at pole heights of 1, 2 and 3, as its profiles show them, ours are 1.8399, 1.5833 and 1.1953. The second and third state lie behind
 the limit point (P = 1.879 at a pole height of 1.174): they are stable under volume control only.
 
-The differences of 0.1 and 0.2 % are not those of the paper's equations (60) as printed (see figure 6), which for this material
-give 1.8383, 1.5837 and 1.1955; they would be those of pole heights of 1.996 and 2.993. What they come from is not known.
+The differences of 0.1 and 0.2 % do not come from the paper's equations (60) as printed (see figure 6), which give 1.8383, 1.5837 and 1.1955
+for this material. Pole heights of 1.996 and 2.993 would explain them. What they come from is not known.
 
     python demos/paper/figure_3.py                 picture and table in out/figure-3, 3 seconds
 

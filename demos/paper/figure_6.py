@@ -4,10 +4,10 @@ The paper gives eight pressures for each strength, for falling height of the pol
 to a limit point and falls behind it. The largest printed pressures are 2.01, 1.81 and 1.688; the limit points of the equations of
 equilibrium (39) are at 1.934, 1.754 and 1.648, by finite elements, by collocation and by shooting alike.
 
-The printed pressures are those of the paper's equations (60), which it integrates, as they are printed: there the derivative of
-the meridional stress has the circumferential stretch in place of the meridional one (see printed_equations.py). Their largest
-pressures are 2.011, 1.810 and 1.688; and with the poles of the eight profiles at equal distances, two numbers for a list that are fitted,
-all 24 printed pressures are met within 0.007. With the equations (39) the best fit misses by up to 0.09.
+The printed pressures follow from the equations (60) as printed, which the paper integrates. There the derivative of the meridional stress
+has the circumferential stretch in place of the meridional one (see printed_equations.py). Their largest pressures are 2.011, 1.810 and
+1.688; and with the poles of the eight profiles at equal distances, two numbers for a list that are fitted, all 24 printed pressures are met
+within 0.007. With the equations (39) the best fit misses by up to 0.09.
 
 What else was tried and does not explain them: the integrator's tolerances (with MATLAB's defaults P changes by 2e-5 at most), the start at
 r = 1e-5, and one other value of chi M, of mu, of h, or of one of the material's moduli or first two exponents. The three strengths would

@@ -1,10 +1,10 @@
 """Figure 8: little inflated, the pole drawn down by a dipole of strength 400 at h = -3.25 (a) and -3.75 (b), and its wrinkles.
 
-The paper gives six and eight pressures for falling height of the pole, and not the heights. They are again those of its equations (60)
-as printed (see figure 6), for poles from 0 down to -1: at these two heights they give 2.226 and 3.721 in (a), 0.950 and 1.444 in (b),
-where the paper prints 2.23 and 3.72, 0.95 and 1.44. The equations of equilibrium (39) give 2.258 and 4.824, 0.954 and 1.752, by finite
-elements and by collocation. In (b) these have a highest pressure of 1.2871 before the last state and a lowest one of 1.2544, where the
-paper prints 1.288, 1.29 and 1.287.
+The paper gives six and eight pressures for falling height of the pole, and not the heights. They follow again from its equations (60) as
+printed (see figure 6), for poles from 0 down to -1. At these two heights the equations give 2.226 and 3.721 in (a), 0.950 and 1.444 in (b).
+The paper prints 2.23 and 3.72, 0.95 and 1.44. The equations of equilibrium (39) give 2.258 and 4.824, 0.954 and 1.752, by finite elements
+and by collocation. In (b) these have a highest pressure of 1.2871 before the last state and a lowest one of 1.2544, where the paper prints
+1.288, 1.29 and 1.287.
 
 The other heights are those at which (60) give the printed pressures, met in this order; ours are the equilibria at the same heights. All of
 them are wrinkled everywhere by their total stress, as the paper says. It calls the stability of the six states (a) and of the first and

@@ -1,7 +1,7 @@
 """What the figures have in common: the paper's material and scenes, and tables of its numbers beside ours.
 
 Paper: P. Saxena, N. H. Reddy & S. P. Pradhan, Magnetoelastic deformation of a circular membrane: wrinkling and limit point instabilities,
-Int. J. Non-Linear Mech. 116 (2019), abbreviated "the paper" here. Parameters are those of its table 1.
+Int. J. Non-Linear Mech. 116 (2019), abbreviated "the paper" here. Its table 1 gives the parameters.
 """
 
 from __future__ import annotations

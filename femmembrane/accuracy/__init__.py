@@ -1,1 +1,1 @@
-"""How far answers are from those of the continuum, meshes that keep them near, independent methods, and what accuracy costs."""
+"""Errors of answers, meshes that keep them small, independent methods, and what accuracy costs."""

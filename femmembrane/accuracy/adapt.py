@@ -1,9 +1,9 @@
-"""A mesh that keeps a run as accurate as is asked for, at about the least cost.
+"""A mesh that keeps a run as accurate as asked, at about the least cost.
 
-The run is made once on a trial mesh, at a few of its loads. Where the membrane is hard to describe is read off its states: by how much
-the best that elements of a lower degree could do misses them, element by element. Elements of degree p share that evenly if their sizes
-follow the density of the misses to the power 1/(2 p + 1), one density for all states, each with the weight of its own estimated error.
-The number of elements is then found by estimating the errors of the hardest states on meshes with that grading.
+The run is made once on a trial mesh, at a few of its loads. Its states show where the membrane is hard to describe: in each element, by the
+difference between the state and its best approximation of a lower degree. Elements of degree p share that evenly if their sizes follow the
+density of the misses to the power 1/(2 p + 1). There is one density for all states, in which each has the weight of its own estimated
+error. The number of elements is then found by estimating the errors of the hardest states on meshes with that grading.
 
 The degree grows by half with every digit asked for, and falls again where the fewest elements give more. Unknowns are then within a small
 factor of the least possible. With equal elements the hardest of the reference scenes (recorded on 2026-11-24) need for 1e-4, 1e-6, 1e-8
@@ -41,9 +41,9 @@ Follow = Callable[[Scene], "Branch"]
 
 #: states of the trial run whose errors are estimated
 STATES = 12
-#: meshes that are chosen, at most, until a run is as good as asked for all along
+#: most meshes that are chosen until a run is accurate enough all along
 _ROUNDS = 2
-#: of these, the hardest ones are tried on every mesh
+#: number of these equilibria, the hardest ones, that are tried on every mesh
 _TRIED = 4
 #: elements of the trial meshes, tried in turn until errors can be estimated
 _TRIAL_MESHES, _TRIAL_DEGREE = (12, 24, 48), 6
@@ -51,25 +51,25 @@ _TRIAL_MESHES, _TRIAL_DEGREE = (12, 24, 48), 6
 _BLIND = 1e-2
 #: degree of the elements whose misses grade the mesh
 _GRADING_DEGREE = 4
-#: highest degree where zones are wrinkled: borders inside elements leave higher ones nothing to gain
+#: highest degree where zones are wrinkled: higher degrees gain nothing with borders inside elements
 _WRINKLED_DEGREE = 4
 #: fewer elements would do for some accuracies, but may let a run lose its branch
 _FEWEST, _MOST = 3, 2000
-#: the part of the accuracy that estimates, which are off by some tens of per cent, may use
+#: estimates are off by some tens of per cent, and may use this part of the accuracy
 _SHARE = 0.6
-#: share and inner radius of the elements that go to the pole when its height is held: the answer to a force on a point, which decides how
-#: a height converges, is a logarithm there
+#: share and inner radius of the elements that go to the pole when its height is held: the response to a force on the pole, which decides
+#: how a height converges, is logarithmic there
 _POLE_SHARE, _POLE_RADIUS = 0.3, 0.005
 #: smallest density of elements over the mean, and smallest pressure over the largest one that still counts by itself
 _LEAST_DENSITY, _LEAST_PRESSURE = 0.1, 0.01
 
 
 def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
-    """The scene on a mesh that keeps the errors of P and of the total energy below the accuracy that its open mesh asks for.
+    """The scene on a mesh with errors of P and of the total energy below the accuracy that its open mesh asks for.
 
-    Errors are those at the same volume, at the same pole height for a run by heights, and with arc length the smaller of both, which is
-    regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run, and over
-    the sum of the sizes of elastic and magnetic energy. States without an estimate (compressed, slack) do not count.
+    Errors are compared at the same volume, and in a run by heights at the same pole height. With arc length the smaller of both counts,
+    since it is regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run,
+    and over the sum of the sizes of elastic and magnetic energy. States without an estimate (compressed, slack) do not count.
 
     Parameters
     ----------
@@ -91,8 +91,9 @@ def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
 
 @dataclass(frozen=True)
 class Shortfall:
-    """Where a run leaves the accuracy that its mesh was chosen for: ``kept`` equilibria are as good as asked for, ``error`` is the estimate
-    for the next one, NaN where there is none."""
+    """Where a run leaves the accuracy that its mesh was chosen for. ``kept`` equilibria are as accurate as asked; ``error`` is the estimate
+    for the next one, or NaN without an estimate.
+    """
 
     kept: int
     accuracy: float
@@ -108,7 +109,7 @@ class Shortfall:
 def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene, Shortfall | None]:
     """As :func:`choose_mesh`, with the errors of the run on the chosen mesh estimated and, where they are too large, the mesh chosen again.
 
-    A few states of a trial do not stand for all of a run: one that ends in a spike below a source becomes harder without end.
+    A few states of a trial do not stand for a whole run: a run that ends in a spike below a source becomes harder without end.
     """
     controls = _controls(control)
     trial, found = _trial(scene, follow, control), None
@@ -139,7 +140,7 @@ def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene,
 
 
 def _farther(branch: Branch, shortfall: Shortfall, other: Branch, others: Shortfall | None) -> bool:
-    """Whether more of a run is as good as asked for than of another one."""
+    """Whether this run keeps its accuracy longer than another run."""
     return others is not None and _way(branch, shortfall.kept) > _way(other, others.kept)
 
 
@@ -150,7 +151,7 @@ def _way(branch: Branch, kept: int) -> float:
 
 
 def _checked(branch: Branch) -> list[int]:
-    """Equilibria of a run whose errors say most: some all along, the extreme ones, and those with the largest kinks."""
+    """Equilibria of a run whose errors say most: some all along, the extreme ones, and the ones with the largest kinks."""
     potential = branch[0].potential
     kinks = [largest_kink(potential, eq.state) for eq in branch]
     return sorted({*spread([eq.volume for eq in branch]), *np.argsort(kinks)[-_TRIED:].tolist()})
@@ -181,7 +182,7 @@ def _shortfall(branch: Branch, controls: tuple[str, ...], accuracy: float) -> Sh
 
 
 def _across(potential: Potential, eq: Equilibrium, scale: float) -> float:
-    """Estimated relative error of P next to folds of volume and height: how far the branch of a finer space is away there."""
+    """Estimated relative error of P next to folds of volume and height: the distance to the branch of a finer space there."""
     evaluation = potential.evaluate(eq.state, eq.pressure)
     state = State(eq.state, eq.pressure, evaluation, 0, 0.0, 0.0, 0.0)
     met = met_across(potential_of(finer_space(potential, evaluation)[0]), potential, first_point(potential, state, 1))
@@ -266,7 +267,7 @@ class _Trial:
     scale: float
 
     def before_the_hardest(self) -> _Trial | None:
-        """The trial up to its hardest state; None where that is among the first."""
+        """The trial up to its hardest state; None if this is among the first states."""
         end = int(self.errors.argmax())
         return replace(self, states=self.states[:end], errors=self.errors[:end]) if end > 1 else None
 
@@ -303,9 +304,8 @@ class _Trial:
 
 
 def relative_error(potential: Potential, x: Array, pressure: float, controls: Sequence[str], scale: float = 0.0) -> float:
-    """Larger one of the estimated relative errors of P and of the energy, the smallest under the controls; NaN without an estimate.
-
-    ``scale`` is the least pressure that an error is relative to.
+    """The larger of the estimated relative errors of P and of the energy, under the control for which it is smallest; NaN without an
+    estimate. Errors are relative to the pressure, or to ``scale`` where the pressure is smaller.
     """
     evaluation = potential.evaluate(x, pressure)
     if ill_posed(potential, evaluation) is not None:
@@ -335,7 +335,7 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
     if trial is None:
         raise failure
     if not len(trial.errors):
-        message = f"mesh.accuracy = {_accuracy(scene):g}: no error can be estimated at any state of the run, which depend on the mesh"
+        message = f"mesh.accuracy = {_accuracy(scene):g}: no error can be estimated, since all states of the run depend on the mesh"
         raise SolveError(message, status=Status.ACCURACY_NOT_MET)
     return trial
 
@@ -375,7 +375,9 @@ def spread(loads: ArrayLike) -> list[int]:
 
 
 def _misses(space: Space, x: Array) -> Array:
-    """What elements of the grading degree miss in each element: the integral of the squared slopes of the difference, relative to all."""
+    """The part of a state that elements of the grading degree miss, for each element: the integral of the squared slopes of the difference,
+    over the sum of all.
+    """
     low = space_of(space.mesh, _GRADING_DEGREE)
     missed = x - transferred(low, transferred(space, x, low), space)
 

@@ -77,12 +77,12 @@ def collocate(
 
 
 def _first(form: StrongForm, guess: Guess, scale: float) -> tuple[Array, Array]:
-    """Mesh and unknowns from the profile of a guess; with a scale the volume over it is one of them."""
+    """Mesh and unknowns from the profile of a guess. With a scale the volume over this scale is an unknown."""
     if guess.profile is None:
         raise InputError("guess.profile", None, "missing; collocation sets out from a profile with columns r, rho and eta")
     r, rho, eta = (np.asarray(guess.profile[name], dtype=float) for name in ("r", "rho", "eta"))
     if r.ndim == 1 and r.size > 2 and abs(r[0]) <= LEAST_LENGTH and abs(r[-1] - 1) <= LEAST_LENGTH:
-        r = np.array([0.0, *r[1:-1], 1.0])  # whoever computes the ends meets them to round-off only
+        r = np.array([0.0, *r[1:-1], 1.0])  # computed ends are exact to round-off only
     if r.ndim != 1 or r.size < 3 or r[0] != 0 or r[-1] != 1 or not (np.diff(r) > 0).all() or not (r.shape == rho.shape == eta.shape):
         raise InputError(
             "guess.profile", f"{r.size} radii", "three or more increasing radii from 0 to 1 are allowed, with rho and eta at each"
@@ -105,7 +105,7 @@ def _solution(form: StrongForm, found: Any, conditions: Any, pressure: float | N
     """The record, with integrals over the profile that was found."""
     left, size = found.x[:-1], np.diff(found.x)
     points = left + size * (_POINTS[:, None] + 1) / 2
-    with np.errstate(all="ignore"):  # what is recorded of a failed solve may be anything
+    with np.errstate(all="ignore"):  # the numbers of a failed solve may be anything
         density = form.densities(points.ravel(), found.sol(points.ravel())[:4]).reshape(3, *points.shape)
         volume, elastic, magnetic = (float(v) for v in np.einsum("q,kqe,e->k", _WEIGHTS, density, size / 2))
         ends = np.abs(conditions(found.y[:, 0], found.y[:, -1])).max()

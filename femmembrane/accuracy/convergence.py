@@ -7,7 +7,8 @@ import numpy as np
 from ..discretization.space import Space
 from ..potential import Array
 
-#: of an eigenvalue, whose matrices have large entries that cancel; recorded on 2026-11-24: up to 3e-13 with 64 elements of degree 4
+#: round-off of an eigenvalue, whose matrices have large entries that cancel; recorded on 2026-11-24: up to 3e-13 with 64 elements of degree
+#: 4
 EIGENVALUE_ROUND_OFF = 256 * np.finfo(float).eps
 
 

@@ -1,7 +1,7 @@
-"""Work against precision: what one equilibrium costs on every mesh and by every method, and how far it is from the exact one.
+"""Work against precision: the cost and the error of one equilibrium, on every mesh and by every method.
 
-Everything runs in one process and in turns (:func:`in_turns`): every piece of work once, then every piece again, so that whatever else the
-machine is doing falls on all of them alike; what is compared are medians.
+Everything runs in one process and in turns (:func:`in_turns`): every piece of work once, then every piece again. So other work of the
+machine falls on all pieces alike. Medians are compared.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TOLERANCES: Mapping[str, tuple[float, ...]] = {
 
 #: radii of the profile that collocation sets out from
 _RADII = np.linspace(0, 1, 33)
-#: a relative error above this is another equilibrium, not an inaccurate one
+#: a state with a relative error above this is another equilibrium, not an inaccurate one
 _ANOTHER = 0.5
 #: shortest turn in seconds, most calls in one, and most times a problem is built
 _TURN, _MOST_CALLS, _BUILDS = 0.01, 50, 3
@@ -72,8 +72,8 @@ class Job:
 def in_turns(works: Sequence[Callable[[], Any]], repeat: int, budget: float, clock: Clock) -> tuple[list[Any], list[list[float]]]:
     """Do every piece of work ``repeat`` times, in turns.
 
-    A first call of each, with what it builds once, is not counted, unless it alone takes more than the ``budget`` in seconds; no piece is
-    done again once its calls have taken that long. Quick work is done several times in a turn, so that it finds its data in the
+    The first call of a piece, which may build things once, is not counted, unless it alone takes more than the ``budget`` in seconds. A
+    piece is not repeated once its calls have taken that long. Quick work is done several times in a turn, so that it finds its data in the
     processor's cache as it would in a run; the turn's mean counts.
 
     Returns
@@ -103,10 +103,10 @@ def in_turns(works: Sequence[Callable[[], Any]], repeat: int, budget: float, clo
 def measure(jobs: Sequence[Job], reference: float, repeat: int, budget: float, clock: Clock) -> list[Measurement]:
     """The lines of all jobs with their times and errors."""
     setups = [(k, job.setup) for k, job in enumerate(jobs) if job.setup is not None]
-    # apart from the rest: what they build anew would push what the others keep out of the caches of built problems
+    # apart from the rest: the problems that they build would push the problems of the others out of the caches
     _, building = in_turns([setup for _, setup in setups], min(repeat, _BUILDS), budget, clock)
     for k, _ in setups:
-        jobs[k].work()  # builds what it keeps: only of work without a set-up may the very first call count
+        jobs[k].work()  # this call builds what is kept: the very first call counts only for work without a set-up
     results, seconds = in_turns([job.work for job in jobs], repeat, budget, clock)
     medians = [1e3 * statistics.median(times) for times in seconds]
     # the extra of a first solve; on a noisy machine a difference of medians may fall below zero
@@ -143,9 +143,9 @@ def relative_error(value: float, exact: float) -> float:
 
 
 def with_front(lines: Sequence[Measurement], floor: float) -> tuple[Measurement, ...]:
-    """The lines with those marked that no other solve with the same start beats in both time and error.
+    """The lines, with a mark at every solve that no other solve with the same start beats in both time and error.
 
-    Errors below ``floor``, that of the reference, count as equal.
+    Errors below ``floor``, the error of the reference, count as equal.
     """
     marked = list(lines)
     for start in STARTS:
@@ -192,7 +192,7 @@ class Course:
         self.reference = Reference(value, error, elements, MAX_DEGREE)
 
     def on_mesh(self, elements: int, degree: int) -> Scene:
-        """The scene on another mesh of the same shape, graded alike, and nothing asked of it."""
+        """The scene on another mesh of the same shape, graded alike, without a run and analyses."""
         mesh = self.scene.mesh.with_elements(elements)
         return self.scene.replace(mesh=mesh, degree=degree, run=None, analysis=type(self.scene.analysis)())
 
@@ -255,7 +255,9 @@ class Course:
 
 
 def most_meshes() -> int:
-    """On how many meshes IPOPT can be measured in turns: more problems than are kept built would be built again in every turn."""
+    """Number of meshes on which IPOPT can be measured in turns: as many problems as are kept built. More would be built again in every
+    turn.
+    """
     kept = nlp_functions.cache_info().maxsize
     return 10_000 if kept is None else max(kept - 2, 1)
 

@@ -1,9 +1,9 @@
-"""How far the numbers of an equilibrium are from those of the continuum, estimated by solving again in a finer space.
+"""Errors of the numbers of an equilibrium, estimated by solving again in a finer space.
 
-Values converge at order 2 p for elements of degree p, so that those of degree p + 1 are exact beside them: the difference of the two is
-the error, digits of its own included (Bank & Weiser's hierarchical idea, with the nonlinear problem solved whole). Where a tension field
-is wrinkled somewhere this fails: borders of zones lie inside elements, and what they cost falls with the size of the elements alone.
-There the finer space has quartered elements of one degree more.
+Values converge at order 2 p for elements of degree p, so that values of degree p + 1 are exact beside them. The difference of the two is
+the error, to a few digits. The idea is Bank & Weiser's hierarchical one, with the nonlinear problem solved whole. This fails in a wrinkled
+tension field: borders of zones lie inside elements, and the errors that they cause fall with the size of the elements alone. There the
+finer space has quartered elements of one degree more.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def finer_space(potential: Potential, evaluation: Evaluation) -> tuple[Scene, st
 def same_state(
     finer: Potential, potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str
 ) -> tuple[NewtonResult | None, str]:
-    """The equilibrium in the finer space that the state stands for, or None with the reason why there is none."""
+    """The equilibrium in the finer space that the state stands for, or None with the reason why it was not found."""
     kind = CONTROLS[control]
     held = kind.at(kind.value(potential.space, x, pressure, evaluation.volume))
     start = transferred(potential.space, x, finer.space)
@@ -133,7 +133,7 @@ def _verdicts(
         guess = None if mode is None else transferred(potential.space, mode, finer.space)
         try:
             better[control] = axisymmetric_verdict(finer, evaluation, control, guess)
-        except SpectrumError as error:  # one eigenvalue that cannot be proved must not cost the rest
+        except SpectrumError as error:  # an eigenvalue that cannot be proved must not end the estimate of the rest
             better[control] = Verdict(None, np.nan, np.nan, control, 0, None, str(error))
         if not np.isfinite([verdict.smallest_eigenvalue, better[control].smallest_eigenvalue]).all():
             reason = f"no error of the eigenvalue under {control} control: it could not be proved to be the smallest"

@@ -1,7 +1,7 @@
-"""Shooting from the pole: the equations are integrated to the rim, and what is not known at the pole is chosen so that the rim is met.
+"""Shooting from the pole: the equations are integrated to the rim, and the unknowns at the pole are chosen so that the rim is met.
 
-Two methods: :func:`shoot`, with a high-order integrator and Newton's method, and :func:`shoot_as_published`, that of Saxena, Reddy &
-Pradhan (2019), section 3 and appendix: from r = 1e-5 with a Runge-Kutta pair of order 5(4) and the simplex of Nelder and Mead.
+There are two methods. :func:`shoot` has a high-order integrator and Newton's method. :func:`shoot_as_published` is the method of Saxena,
+Reddy & Pradhan (2019), section 3 and appendix: from r = 1e-5 with a Runge-Kutta pair of order 5(4) and the simplex of Nelder and Mead.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from scipy.optimize import minimize
 from ..scene import Scene
 from .strong_form import POLE_UNKNOWN, Array, Guess, Solution, StrongForm, check_tolerance, prescribed
 
-#: where :func:`shoot` leaves the pole, by a series whose error is of order r^4
+#: radius at which :func:`shoot` leaves the pole, by a series with an error of order r^4
 _START = 1e-4
-#: where the published method leaves it, on a straight line (paper eq. 61)
+#: radius at which the published method leaves the pole, on a straight line (paper eq. 61)
 _PUBLISHED_START = 1e-5
 #: right-hand sides after which a shot that gets nowhere is given up
 _MOST = 10_000
-#: relative step of the differences in Newton's method; they share all steps of the integrator, so its errors are not in them
+#: relative step of the differences in Newton's method; both shots share all steps of the integrator, so that its errors cancel
 _DIFFERENCE = 1e-7
 
 
@@ -53,7 +53,7 @@ class _Shooter:
         return full
 
     def shot(self, u: Array, energies: bool = False) -> tuple[Array, Any]:
-        """State at the rim, shape (4 + integrals, n), of n shots at once with the steps of the integrator in common; and all of it.
+        """State at the rim, shape (4 + integrals, n), of n shots at once with the same steps of the integrator; and the whole solution.
 
         The integrals are the volume when it is prescribed, or with ``energies`` volume and energies. A shot that does not arrive is NaN.
         """
@@ -72,7 +72,7 @@ class _Shooter:
             dy = self.form.rates(r, y, p)
             return dy.ravel() if not extra else np.concatenate([dy, self.form.densities(r, y)[:extra]]).ravel()
 
-        with np.errstate(all="ignore"):  # a wild guess may leave the domain of the energy: whoever asked sees NaN
+        with np.errstate(all="ignore"):  # a wild guess may leave the domain of the energy: the caller sees NaN
             first = self._first(center, stretch, pressure)[: 4 + extra]
             if not np.isfinite(first).all():
                 return failed
@@ -85,7 +85,7 @@ class _Shooter:
         return (found.y[:, -1].reshape(-1, n), found) if found.success else failed
 
     def miss(self, u: Array) -> Array:
-        """Radius and height of the rim that are too much, and the volume, shape (2 or 3, n)."""
+        """By how much radius and height of the rim, and the volume, are too large, shape (2 or 3, n)."""
         return self._miss(self.shot(u)[0])
 
     def _miss(self, rim: Array) -> Array:

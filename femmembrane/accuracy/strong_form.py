@@ -12,7 +12,8 @@ are (e_2, eta, d, phi) with d = e_1 - e_2: at the pole d and phi vanish and ever
 
     y' = S y/r + f(r, y),      S = [[0 0 1 0], [0 0 0 0], [0 0 -2 0], [0 0 0 -1]],      f(0, y) = (0, 0, 0, (m_eta - P lambda^2)/W_1)
 
-and at the rim e_2 = eta = 0. The energies, the volume and the force of the sources are those of the material's and the sources' formulas.
+and at the rim e_2 = eta = 0. The energies, the volume and the force of the sources follow from the formulas of the material and the
+sources.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ Array = NDArray[np.float64]
 
 #: the singular matrix S
 SINGULAR: Array = np.array([[0.0, 0, 1, 0], [0, 0, 0, 0], [0, 0, -2, 0], [0, 0, 0, -1]])
-#: imaginary step of the derivatives of the magnetic energy: no difference is taken, so it may be as small as one likes
+#: imaginary step of the derivatives of the magnetic energy: nothing is subtracted, so that it may be tiny
 _STEP = 1e-30
 
 
@@ -184,12 +185,12 @@ class Guess:
 
     @classmethod
     def of(cls, equilibrium: Any) -> Guess:
-        """The guess that a known state is: an :class:`~femmembrane.Equilibrium` or a :class:`Solution`."""
+        """A known state as a guess: an :class:`~femmembrane.Equilibrium` or a :class:`Solution`."""
         profile = equilibrium.profile()
         return cls(equilibrium.pressure, equilibrium.center_height, float(profile["stretch_1"][0]), profile)
 
     def beyond(self, before: Guess, factor: float = 1.0) -> Guess:
-        """Linear extrapolation: as far again, times ``factor``, as from ``before`` to here; profiles on the same radii."""
+        """Linear extrapolation from ``before`` through this solution, by ``factor`` times their distance; profiles on the same radii."""
 
         def along(name: str) -> float:
             return float(getattr(self, name) + factor * (getattr(self, name) - getattr(before, name)))
@@ -203,7 +204,7 @@ class Guess:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What a method that is independent of the finite elements found.
+    """The answer of a method that is independent of the finite elements.
 
     Attributes
     ----------
@@ -250,7 +251,7 @@ class Solution:
         return {"r": at, "rho": np.exp(e2) * at, "eta": eta, "stretch_1": np.exp(e2 + d), "stretch_2": np.exp(e2)}
 
 
-#: what may be prescribed, as the position of its number in (center_height, stretch, pressure); a volume is none of them
+#: what may be prescribed, as the position of its number in (center_height, stretch, pressure); a volume has no position there
 POLE_UNKNOWN: Mapping[str, int | None] = {"center_height": 0, "pressure": 2, "volume": None}
 
 

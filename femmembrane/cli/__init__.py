@@ -2,8 +2,8 @@
 
 Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
 full disk), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
-In a pipe nothing is printed but errors, one line each on stderr. One module a command; whatever is slow to import is imported
-inside its functions, for ``--help`` should answer at once.
+In a pipe nothing is printed but errors, one line each on stderr. There is one module a command. Slow imports stand inside its functions, so
+that ``--help`` answers at once.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The words after ``femmembrane``; those of the process by default.
     """
     open_streams()
-    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; what a notebook has put there need not exist here
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where it keeps its list of fonts is no matter for a message
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; the backend of a notebook need not exist here
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # the place of its list of fonts is not worth a message
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
-        sys.stdout.flush()  # what does not fit on the disk is told here, not by Python at its end
+        sys.stdout.flush()  # a full disk is reported here, not by Python when it ends
     except CycloptsError as error:
         return fail(BAD_INPUT, f"{error} Try femmembrane --help.")
-    except BrokenPipeError:  # whoever reads the pipe has seen enough
+    except BrokenPipeError:  # the reader of the pipe has seen enough
         drop(sys.stdout)
         return DONE
     except InputError as error:

@@ -14,8 +14,8 @@ from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail,
 def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False) -> int:
     """Measure error against time of the last equilibrium that a scene file asks for, by every method on every mesh.
 
-    Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 4 results could not be written, 130 interrupted;
-    with all but the first nothing is written.
+    Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 4 results could not be written, 130 interrupted. Only
+    with 0 anything is written.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ Changes = Annotated[
 
 
 def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = True) -> Scene:
-    """The scene of a file, or one that comes with the package, by its name; with values of ``--set`` in place of those of the file."""
+    """The scene of a file, or a scene that comes with the package, by its name. Values of ``--set`` go before the values of the file."""
     from ..scene import Scene, read_tables
 
     if not path.suffix and not path.exists():
@@ -55,9 +55,9 @@ def _bundled(name: str) -> Path:
 
 @contextmanager
 def working(out: Path, names: Iterable[str] = (), folders: Iterable[str] = ()) -> Iterator[None]:
-    """Hold a folder for results, made when there is none, and tried before hours are spent on what could not be kept.
+    """Hold a folder for results. It is made if it does not exist, and tried before hours are spent on results that could not be kept.
 
-    What a killed command left unfinished in it is removed; if nothing is written to a folder that was made here, it goes again.
+    Unfinished files of a killed command are removed. A folder that was made here goes again if nothing is written to it.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def working(out: Path, names: Iterable[str] = (), folders: Iterable[str] = ()) -
 
 
 def _make(out: Path) -> list[Path]:
-    """Make the folder, and write to it once; the folders that were not there before, the innermost first."""
+    """Make the folder, and write to it once. Answers the folders that were made, the innermost first."""
     import tempfile
 
     made: list[Path] = []

@@ -9,10 +9,10 @@ from typing import Any, Self
 
 
 class Interrupts:
-    """Ctrl-C that is never lost, and spares the files.
+    """Ctrl-C that is never lost and leaves no broken file.
 
     Compiled solvers may swallow the exception that an interrupt raises, so it is also noted, and raised again at the next :meth:`check`.
-    While ``hold`` is set the first interrupt is noted only, so that a step or the results are finished; a second one gets through.
+    While ``hold`` is set the first interrupt is only noted, so that a step is finished, or the results are. A second one gets through.
     """
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class Interrupts:
         self._previous: Any = None
 
     def __enter__(self) -> Self:
-        # elsewhere than in the main thread, or where the caller handles (or ignores) interrupts, they are not ours
+        # outside the main thread, or where the caller handles (or ignores) interrupts, they are left to it
         if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             self._previous = signal.signal(signal.SIGINT, self._handle)
         return self

@@ -35,15 +35,15 @@ def say(text: str) -> None:
 
 
 def _write(stream: TextIO, text: str) -> None:
-    """The one way in which text that may come from files and options goes to a terminal."""
+    """Write text to a terminal. Text that may come from files and options goes no other way."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     stream.write(printable(text).encode(encoding, "backslashreplace").decode(encoding))
 
 
 def open_streams() -> None:
-    """Streams that whoever started the process has closed lead nowhere; a file opened later cannot take their place.
+    """Streams that were closed before the process started lead nowhere. A file that is opened later cannot take their place.
 
-    What cannot be encoded for the reader of the output is written as an escape.
+    A character that the output cannot encode is written as an escape.
     """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         if getattr(sys, name) is not None:
@@ -61,7 +61,7 @@ def open_streams() -> None:
 
 
 def drop(stream: TextIO) -> None:
-    """Whatever a stream still holds leads nowhere, where Python would complain again when it flushes at its end."""
+    """Drop what a stream still holds: Python would complain again when it flushes at its end."""
     try:
         number = stream.fileno()
     except (OSError, ValueError):  # a stream of Python alone
@@ -72,7 +72,7 @@ def drop(stream: TextIO) -> None:
 
 
 def refused(error: BaseException) -> bool:
-    """Whether an error says that the system did not take what was to be written, and nothing of what that was."""
+    """Whether an error says that the system refused to write, rather than that something is wrong with the data."""
     return isinstance(error.__cause__ if isinstance(error, InputError) else error, OSError)
 
 

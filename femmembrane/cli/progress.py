@@ -25,8 +25,8 @@ class _Quiet:
 class _Bar:
     """A line on the terminal: bar, step, load, pressure, verdicts, remaining time.
 
-    By arc length nobody knows how many steps there will be: in place of bar and remaining time stand how far the branch has come to where
-    it ends, and the time that has passed.
+    By arc length the number of steps is not known. The line then shows how far the branch has come towards its end, and the time that has
+    passed.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -54,7 +54,7 @@ class _Bar:
 
 
 def observer(scene: Scene) -> AbstractContextManager[_Observer]:
-    """Who watches a run: a line on a terminal, nobody in a pipe."""
+    """The observer of a run: a line on a terminal, none in a pipe."""
     return _Bar(scene) if sys.stderr.isatty() else nullcontext(_Quiet())
 
 

@@ -28,8 +28,8 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
     Now and then the branch so far is saved as checkpoint.nc: --resume goes on from there after an interrupt, a kill or a full disk. One run
     at a time may write to a folder.
 
-    Exit codes: 0 done, 2 bad input or a folder in use, 3 not converged, 4 results could not be written, 130
-    interrupted; with 3 and 130 what was computed is written all the same, with 4 as much of it as there is room for.
+    Exit codes: 0 done, 2 bad input or a folder in use, 3 not converged, 4 results could not be written, 130 interrupted. With 3 and 130
+    everything that was computed is written, with 4 as much of it as there is room for.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         elif resume and (ended := _ended(asked, out)) is not None:
             return ended
         checkpoints = Checkpoints(out, kept)
-        interrupts.hold = True  # until the next equilibrium: raised inside a compiled solver it is swallowed, with a warning from there
+        interrupts.hold = True  # held until the next equilibrium: inside a compiled solver the exception would be swallowed, with a warning
         for remark in checkpoints.remarks:
             fail(DONE, remark)
         branch, code, message = _compute(asked, interrupts, checkpoints)
         branch = replace(branch, remarks=checkpoints.remarks) if checkpoints.remarks else branch
-        if code == INTERRUPTED and not len(branch):  # whatever an earlier run left in the folder is worth more
+        if code == INTERRUPTED and not len(branch):  # the files of an earlier run in the folder are worth more
             raise KeyboardInterrupt
         try:
             if code == INTERRUPTED:
@@ -81,7 +81,7 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
 
 
 def _ended(scene: Scene, out: Path) -> int | None:
-    """The exit code of the run of this scene that has completed the folder, None if there is none and something is to be computed."""
+    """The exit code of the run of this scene that completed the folder; None if something is still to be computed."""
     from ..results.checkpoint import refuse_others
     from ..results.output import read_record
 
@@ -92,7 +92,7 @@ def _ended(scene: Scene, out: Path) -> int | None:
     if facts["status"] == Status.INTERRUPTED:
         return None
     if facts["equilibria"]:
-        finished(out)  # what is damaged is refused here, and not said to be done
+        finished(out)  # damaged results are refused here, and not reported as done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)
@@ -108,7 +108,7 @@ def _compute(scene: Scene, interrupts: Interrupts, checkpoints: Checkpoints) -> 
     with observer(scene) as progress:
 
         def on_step(index: int, total: int, equilibrium: Equilibrium) -> None:
-            interrupts.check()  # what a solver found after it swallowed an interrupt is not what it would have found
+            interrupts.check()  # after a swallowed interrupt a solver may answer something else than without it
             found.append(equilibrium)
             progress.step(len(found), total, equilibrium)
 
@@ -125,7 +125,7 @@ def _compute(scene: Scene, interrupts: Interrupts, checkpoints: Checkpoints) -> 
 
 
 def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Status, message: str) -> Branch:
-    """The branch of what was found before the computation ended early; special points are not searched for."""
+    """The branch of the equilibria found before the computation ended early. Special points are not searched for."""
     from ..results.records import Branch
 
     used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
@@ -144,7 +144,7 @@ def _write(branch: Branch, out: Path, scene: Path, changes: Sequence[str]) -> li
 
 
 def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:
-    """What is lost and what is not; the branch is saved for --resume, if a file of that size can be written now."""
+    """A message on what is lost and what is not. The branch is saved for --resume, if a file of that size can be written now."""
     with suppress(InputError, OSError):
         checkpoints.save()
     saved = checkpoints.path.exists()

@@ -89,7 +89,7 @@ def new(name: str, /) -> int:
 
 
 def bundled() -> dict[str, Path]:
-    """The scenes that come with the package, by name: those of the source tree, or those that were installed with it."""
+    """The scenes that come with the package, by name: from the source tree, or as they were installed."""
     if (_TREE / "pyproject.toml").is_file():
         found = list((_TREE / "demos").glob("*.toml"))
     else:

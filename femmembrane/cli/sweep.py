@@ -138,7 +138,7 @@ class _SceneBar:
 
     def scene(self, count: int, total: int, failed: int) -> None:
         now = time.monotonic()
-        if self._first is None:  # those that were kept say nothing about the rate
+        if self._first is None:  # scenes that were kept say nothing about the rate
             self._first = count, now
         made, seconds = count - self._first[0], now - self._first[1]
         rate = f"{made / seconds:.3g} scenes/s" if made and seconds > 0 else ""

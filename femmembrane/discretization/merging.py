@@ -1,8 +1,8 @@
 """Points of a mesh that are meant to be the same, and points that are meant to lie on the axis.
 
-Programs write coordinates with 16 digits, with 7, or with what is left of them: the two ends of a ring, the ends of segments that were
-drawn one by one, or a pole at R = sin(pi) agree to round-off only. What agrees to :data:`.meridian.ROUND_OFF` of the size of the mesh, and
-is at the same time close in comparison with the cells there, is made equal. Each function also says in words what it changed.
+Programs write coordinates with 16 digits, with 7, or with fewer. So some points agree to round-off only: the two ends of a ring, the ends
+of segments that were drawn one by one, a pole at R = sin(pi). Points are made equal if they agree to :data:`.meridian.ROUND_OFF` of the
+size of the mesh and are close in comparison with the cells there. Each function also says in words what it changed.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from .meridian import LEAST_LENGTH, ROUND_OFF, Array, extent
 
 Cells = NDArray[np.int64]
 
-#: what is close in comparison with a cell is closer than this part of its length
+#: points closer than this part of the length of a cell are close in comparison with it
 _SHARE = 0.1
 
 
 def mended(points: Array, step: int) -> tuple[Array, tuple[str, ...]]:
-    """The points of one curve with its ends closed, put on the axis and on the plane Z = 0 where they all but are.
+    """The points of one curve. Its ends are closed, and points are put on the axis and on the plane Z = 0, where they lie there to
+    round-off.
 
     ``step`` is the number of points that a cell takes, 2 where it has one inside. Points are (R, Z), shape (n, 2).
     """
@@ -48,17 +49,17 @@ def mended(points: Array, step: int) -> tuple[Array, tuple[str, ...]]:
 
 
 def merged(points: Array, cells: Cells) -> tuple[Cells, tuple[str, ...]]:
-    """Cells whose points are one where they are meant to be, each cell once.
+    """The cells, each once, with points that are meant to be the same made one.
 
-    Points that agree to round-off of double precision are one. Loose ends, points at which a single cell ends, are joined where they agree
-    to that of single precision: in a mesh that is graded strongly two points of one element may be as close.
+    Points that agree to round-off of double precision are one. Loose ends are points at which a single cell ends. They are joined where
+    they agree to round-off of single precision. Other points are not: in a strongly graded mesh two points of one element may be as close.
     """
     used = np.unique(cells)
     if not np.isfinite(points[used]).all():
         return cells, ()
     size = extent(*points[used].T)
     lengths = np.hypot(*(points[cells[:, 1]] - points[cells[:, 0]]).T)
-    if not (lengths > LEAST_LENGTH * size).all():  # the curve of them will be refused, by the number of the cell
+    if not (lengths > LEAST_LENGTH * size).all():  # the curve will be refused, with the number of the cell
         return cells, ()
     number = np.arange(len(points))
     number[used] = used[_groups(points[used], LEAST_LENGTH * size)]
@@ -92,7 +93,7 @@ def merged(points: Array, cells: Cells) -> tuple[Cells, tuple[str, ...]]:
 
 
 def _once(cells: Cells, lengths: Array) -> tuple[Cells, Array, int]:
-    """Cells without those that are there before, in either direction."""
+    """Cells without repetitions; a cell counts as repeated in either direction."""
     turned = np.concatenate([np.sort(cells[:, :2], axis=1), cells[:, 2:]], axis=1)
     _, first = np.unique(turned, axis=0, return_index=True)
     first.sort()
@@ -100,7 +101,7 @@ def _once(cells: Cells, lengths: Array) -> tuple[Cells, Array, int]:
 
 
 def _groups(points: Array, distance: float) -> NDArray[np.int64]:
-    """For each point the first of those that lie within a distance, or in a chain of such steps."""
+    """For each point the first point that lies within a distance of it, or is reached in a chain of such steps."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

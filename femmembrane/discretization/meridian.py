@@ -1,17 +1,17 @@
 """Reference meridians: the curve s -> (R, Z) that is revolved, and how its ends are held.
 
-A meridian is divided into elements at :meth:`Meridian.breakpoints`; everything else (kinematics, energies, mass) is written for a
-general curve, so a new shape is a new class here and nothing more.
+A meridian is divided into elements at :meth:`Meridian.breakpoints`. Everything else (kinematics, energies, mass) is written for a general
+curve, so a new shape is a new class here and nothing more.
 
 Inside
 ------
-The pressure pushes from inside. Which side that is follows from the reference shape by one rule, whatever the direction in which the
-meridian runs, and whichever end of it is up (:func:`side`):
+The pressure pushes from inside. Which side is inside follows from the reference shape by one rule (:func:`side`). The direction in which
+the meridian runs plays no part, and neither does the end that is up:
 
-* a shape that encloses a volume, by itself or with flat lids across its ends, has its inside there: V > 0 at rest, and P > 0 inflates it;
-* of a flat shape, and of one that encloses nothing, inside is below: P > 0 lifts it, and V counts what is below the membrane.
+* A shape may enclose a volume, by itself or with flat lids across its ends. Its inside is there: V > 0 at rest, and P > 0 inflates it.
+* A flat shape, and a shape that encloses nothing, have their inside below: P > 0 lifts them, and V counts what is below the membrane.
 
-A dome is so filled from below and a bowl from above, and a liquid with gamma > 0 (:class:`~femmembrane.Hydrostatic`) is heavy in both.
+So a dome is filled from below and a bowl from above. A liquid with gamma > 0 (:class:`~femmembrane.Hydrostatic`) is heavy in both.
 """
 
 from __future__ import annotations
@@ -60,19 +60,39 @@ class Meridian(Hashable, Protocol):
         """Element ends along s, increasing, shape (elements + 1,)."""
 
     def position(self, s: Array) -> tuple[Array, Array]:
-        """(R, Z) at s, in units of R0."""
+        """(R, Z) at s, in units of R0.
+
+        Parameters
+        ----------
+        s : ndarray
+            Parameters of the meridian, between the first and the last of :meth:`breakpoints`.
+        """
 
     def tangent(self, s: Array) -> tuple[Array, Array]:
-        """(dR/ds, dZ/ds) at s."""
+        """(dR/ds, dZ/ds) at s.
+
+        Parameters
+        ----------
+        s : ndarray
+            Parameters of the meridian, between the first and the last of :meth:`breakpoints`.
+        """
 
     def refined(self) -> Self:
         """The same shape with every element divided in two."""
 
     def with_elements(self, elements: int) -> Self:
-        """The same shape, graded alike, with another number of elements."""
+        """The same shape, graded alike, with another number of elements.
+
+        Parameters
+        ----------
+        elements : int
+        """
 
     def supports(self) -> tuple[Support | frozenset[str], Support | frozenset[str]] | tuple[()]:
-        """How the first and last point are held (a plain subset of {"u", "w"} is what a support holds); nothing for a closed curve."""
+        """How the first and the last point are held; nothing for a closed curve.
+
+        A plain subset of {"u", "w"} in place of a :class:`Support` names the displacements that are 0.
+        """
 
 
 @dataclass(frozen=True)
@@ -91,19 +111,19 @@ class Disc:
     elements : int
         Number of elements along the radius; 64, or as many as ``radii`` says.
     ratio : float
-        Size of the element at the rim over that of the element at the pole, 1e-6 to 1e6; sizes follow a geometric progression.
+        Size of the element at the rim over the size of the element at the pole, 1e-6 to 1e6. Sizes follow a geometric progression.
     radii : sequence of float, optional
-        Ends of the elements, over R0, strictly increasing from 0 to 1: any other grading, in place of ``elements`` and ``ratio``.
+        Ends of the elements, over R0, strictly increasing from 0 to 1. They give any other grading, in place of ``elements`` and ``ratio``.
     accuracy : float, optional
-        In place of all of these, 1e-12 to 0.1: the relative accuracy for which elements and degree are to be chosen. Until then the mesh is
-        open, has no elements, and nothing can be computed on it.
+        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all of the above. Until they are
+        chosen the mesh is open: it has no elements, and nothing can be computed on it.
     estimated : float, optional
-        The relative error estimated when it was chosen; belongs to a mesh with ``accuracy`` and ``radii``, which keeps both.
+        The relative error that was estimated when the mesh was chosen. Such a mesh has ``accuracy`` and ``radii`` as well.
 
     Raises
     ------
     InputError
-        For a value outside these sets, and for those that contradict each other.
+        For a value outside these sets, and for values that contradict each other.
     """
 
     elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
@@ -150,6 +170,13 @@ class Disc:
         return np.ones_like(s), np.zeros_like(s)
 
     def refined(self) -> Self:
+        """The same shape with every element divided in two.
+
+        Raises
+        ------
+        InputError
+            For a mesh whose elements are still to be chosen.
+        """
         if self.open:
             raise InputError("mesh.accuracy", self.accuracy, "its elements are still to be chosen; refine the mesh of a branch's scene")
         if self.ratio == 1 and self.radii is None:
@@ -160,9 +187,13 @@ class Disc:
         return type(self)(radii=tuple(halved))
 
     def with_elements(self, elements: int) -> Self:
-        """Another number of elements whose ends are the same function of k/elements, so that those of n elements are among those of 2 n.
+        """Another number of elements whose ends are the same function of k/elements.
 
-        Between given ``radii`` that function is linear.
+        So the ends of n elements are among the ends of 2 n elements. Between given ``radii`` the function is linear.
+
+        Parameters
+        ----------
+        elements : int
         """
         if elements == self.elements:
             return self
@@ -176,8 +207,36 @@ class Disc:
 
 
 def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float] | None = None, accuracy: float | None = None) -> Disc:
-    """Mesh of the flat, clamped disc: ``elements`` along the radius, graded by ``ratio`` or ending at ``radii``, or to be chosen for an
-    ``accuracy``; see :class:`Disc`."""
+    """Mesh of the flat, clamped disc.
+
+    Parameters
+    ----------
+    elements : int, optional
+        Number of elements along the radius; 64, or as many as ``radii`` says.
+    ratio : float
+        Size of the element at the rim over the size of the element at the pole. Sizes follow a geometric progression.
+    radii : sequence of float, optional
+        Ends of the elements, increasing from 0 to 1; in place of ``elements`` and ``ratio``.
+    accuracy : float, optional
+        Relative accuracy for which elements and degree are to be chosen; in place of all of the above.
+
+    Returns
+    -------
+    Disc
+
+    Raises
+    ------
+    InputError
+        As for :class:`Disc`.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> [round(float(r), 4) for r in fm.disc(3, ratio=4.0).breakpoints()]
+    [0.0, 0.1429, 0.4286, 1.0]
+    >>> fm.disc(radii=(0.0, 0.5, 0.8, 1.0)).elements
+    3
+    """
     return Disc(elements=elements, ratio=ratio, radii=radii, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
@@ -213,7 +272,7 @@ def _positive(key: str, value: Any, least: float, most: float, what: str) -> Non
 def side(mesh: Meridian) -> int:
     """1 where the inside of a meridian is on its right as it runs, so that the pressure pushes to its left; -1 where it is on its left.
 
-    See the rule at the top of this module. The volume that decides is that between the meridian and flat lids across its ends.
+    The rule stands at the top of this module. The volume between the meridian and flat lids across its ends decides.
     """
     ends = mesh.breakpoints()
     s = ends[:-1] + (_GAUSS[0][:, None] + 1) / 2 * np.diff(ends)
@@ -276,7 +335,7 @@ def _radii(values: Any) -> tuple[float, ...]:
             raise InputError(f"mesh.radii[{k}]", end, FINITE)
     if len(ends) < 2 or not abs(ends[0]) <= LEAST_LENGTH or not abs(ends[-1] - 1) <= LEAST_LENGTH:
         raise InputError("mesh.radii", ends, allowed)
-    ends = (0.0, *ends[1:-1], 1.0)  # whoever computes them meets both ends to round-off only
+    ends = (0.0, *ends[1:-1], 1.0)  # computed ends are 0 and 1 to round-off only
     for k in range(1, len(ends)):
         if not ends[k - 1] < ends[k]:
             raise InputError(f"mesh.radii[{k}]", ends[k], f"a number above the one before ({ends[k - 1]:.9g}) is allowed")

@@ -42,21 +42,22 @@ _GAUSS = np.polynomial.legendre.leggauss(12)
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """A meridian through given points, one cell after the other; lengths are in units of R0, whatever the points say that it is.
+    """A meridian through given points, one cell after the other. Their unit of length is R0.
 
     Parameters
     ----------
     points : sequence of (R, Z)
-        The ends of the cells, of curved ones with the point inside between them: 2 n + 1 points for n cells. A closed curve ends with the
-        point with which it starts. They are kept in the direction, and a closed curve from the start, that the module describes.
+        The ends of the cells: n + 1 points for n straight cells. Between the ends of a curved cell stands the point inside it: 2 n + 1
+        points for n cells. A closed curve ends with the point with which it starts. The module says in which direction points are kept, and
+        from which point a closed curve starts.
     curved : bool
-        Whether cells have a point inside, and are arcs of parabolas; else they are straight.
+        Whether cells have a point inside and are arcs of parabolas. Otherwise they are straight.
     divisions : int
         Number of elements that a cell is divided into.
     first, last : str
         How the ends are held, see :mod:`.supports`; an end on the axis is a pole, and a closed curve has none.
     repaired : sequence of str
-        What was done about points that agree to round-off only, in words; what is done here is added. Nothing else depends on it.
+        In words, what was done about points that agree to round-off only. What is done here is added; no number depends on it.
 
     Raises
     ------
@@ -190,13 +191,18 @@ def meridian_from_points(
     points : array_like, shape (n, 2)
         (R, Z) in units of R0.
     cells : array_like of int, shape (m, 2) or (m, 3), optional
-        Positions of the two ends of each cell, and of the point inside; default: the points one after the other, straight.
+        Positions of the two ends of each cell, and of the point inside. Default: straight cells through the points, in their order.
     divisions, first, last
         As for :class:`Curve`.
+
+    Returns
+    -------
+    Curve
 
     Raises
     ------
     InputError
+        As for :class:`Curve`, and for cells that are no single curve.
     """
     array = _array(points)
     if cells is None:
@@ -213,15 +219,19 @@ def read_meridian(
     ----------
     path : path
     group : str or int, optional
-        The physical group of the meridian: its name, or its number where it has none. In .msh a physical curve, in .inp a set of elements,
-        in .xdmf a grid of several. Left out: all lines of the file.
+        The physical group of the meridian: its name, or its number where it has no name. In .msh it is a physical curve, in .inp a set of
+        elements, in .xdmf one of several grids. Left out: all lines of the file.
     divisions, first, last
         As for :class:`Curve`.
+
+    Returns
+    -------
+    Curve
 
     Raises
     ------
     InputError
-        When the file cannot be read, or holds no meridian, with the number of the cell.
+        When the file cannot be read, or holds no meridian. The message names the cell.
     """
     path = Path(path)
     if path.suffix.lower() not in READERS:
@@ -294,10 +304,10 @@ def write_meridian(mesh: Meridian, path: str | PathLike[str], *, curved: bool = 
     Parameters
     ----------
     mesh : Meridian
-        Of a curve from points that is not divided, reading back gives the same curve to the last bit.
+        Reading the file back gives the same curve to the last bit, if the mesh is a curve from points that is not divided.
     path : path
     curved : bool
-        Cells with a point inside, half-way along s; else straight ones. A curve from points keeps what it has.
+        Whether to write cells with a point inside, half-way along s. A curve from points keeps the cells it has.
 
     Raises
     ------

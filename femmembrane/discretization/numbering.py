@@ -108,7 +108,7 @@ class Numbering:
         self.points: Array = points[0]
 
     def _support(self, n_nodes: int) -> None:
-        """What holds the ends, what closes the volume there, and what is done about rigid motions."""
+        """Find what holds the ends, what closes the volume there, and how rigid motions are kept out."""
         self.supports = tuple(as_support(held) for held in self.mesh.supports())
         self.closed = not self.supports
         R, Z = self.mesh.position(self.ends[[0, -1]])
@@ -126,7 +126,7 @@ class Numbering:
         self.lids = adrift or not all(in_plane)
         shift, tilt = free_rotations(self.supports, np.where(on_axis, 0.0, R), Z)
         self.rotations = (shift and "shift" not in self.anchored, tilt and "tilt" not in self.anchored)
-        radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element may be no values there
+        radius = self.mesh.position(self.ends)[0]  # coefficients of nodes inside an element need not be values
         if not radius.max() > 0:
             raise InputError("mesh.elements", self.n_elements, "a meridian from pole to pole needs 2 or more elements")
         middle = np.abs(np.arange(radius.size) - (radius.size - 1) / 2)
@@ -140,7 +140,7 @@ class Numbering:
 
     @property
     def units(self) -> dict[str, float]:
-        """What pressures, volumes and heights of this membrane are measured by, in those of R0."""
+        """Natural units of pressures, volumes and heights of this membrane, in the units of R0."""
         return {"pressure": 1 / self.unit, "volume": self.unit**3, "center_height": self.unit}
 
     def between(self, at_ends: list[float]) -> tuple[Array, Array]:
@@ -155,7 +155,7 @@ class Numbering:
         if self.pin is not None:
             free[self.nodes[self.pin], 1] = False
         self.n_free = int(free.sum())
-        # one spare slot past the end stands for all that is held at zero
+        # one spare slot past the end stands for everything that is held at zero
         numbers: NDArray[np.int64] = np.full((self.n_nodes, 2), self.n_free, dtype=np.int64)
         numbers[free] = np.arange(self.n_free)
         self.numbers = numbers
@@ -208,7 +208,7 @@ class Numbering:
 
     @cached_property
     def volume_round_off(self) -> float:
-        """What volumes next to that at rest are known to: round-off of the parts that it is the sum of."""
+        """Round-off of volumes next to the volume at rest, which is a sum of larger parts."""
         return 4 * float(np.finfo(float).eps * (self.weights * np.abs(self._volume_density)).sum())
 
     @property
@@ -234,7 +234,7 @@ class Numbering:
     def interpolation_points(self) -> Array:
         """Parameters s of degree + 1 points in each element, ends included, shape (degree + 1, n_elements)."""
         points = self.ends[:-1] + lobatto(self.degree)[:, None] * self.sizes
-        points[0], points[-1] = self.ends[:-1], self.ends[1:]  # neighbours share their end, and the last one is that of the meridian
+        points[0], points[-1] = self.ends[:-1], self.ends[1:]  # neighbours share their end, and the last end belongs to the meridian
         return points
 
     def node_parameters(self) -> Array:
@@ -250,7 +250,7 @@ class Numbering:
 
 
 def band_of(gather: NDArray[np.int64], n_free: int) -> int:
-    """Half bandwidth that the unknowns of the elements, one column each, leave; those numbered ``n_free`` are none."""
+    """Half bandwidth of the unknowns of the elements, one column each. The number ``n_free`` stands for no unknown."""
     inside = gather < n_free
     low, high = np.where(inside, gather, n_free).min(axis=0), np.where(inside, gather, -1).max(axis=0)
     return int((high - low).max(initial=0))

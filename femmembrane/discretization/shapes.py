@@ -1,8 +1,8 @@
 """Reference meridians beyond the disc: annulus, spherical cap, sphere, tube, torus.
 
-The parameter s is the arc length of the reference meridian over R0, from its first end to its last (of an annulus: the radius). A meridian
-of them runs so that the pressure pushes to its left: outwards where it closes a space, up where it is flat. A cap that hangs below its rim
-is the exception, it runs from its apex like any other (:func:`.meridian.side`)::
+The parameter s is the arc length of the reference meridian over R0, from its first end to its last; of an annulus it is the radius. These
+meridians run so that the pressure pushes to their left: outwards where the shape closes a space, up where it is flat. A cap that hangs
+below its rim is the exception: it also runs from its apex (:func:`.meridian.side`)::
 
     annulus  z |        hub              cap  z |  .--.          sphere   .-s=0.       cylinder   |    s = 0      torus       s = 0
                |======o--------o rim            |      '.        z |    .'      '.      z |       |                 z |      .--.
@@ -63,7 +63,12 @@ class _Graded:
         return ends
 
     def with_elements(self, elements: int) -> Self:
-        """Another number of elements whose ends are the same function of k/elements."""
+        """Another number of elements whose ends are the same function of k/elements.
+
+        Parameters
+        ----------
+        elements : int
+        """
         return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
 
     def refined(self) -> Self:
@@ -83,7 +88,7 @@ class Annulus(_Graded):
     inner_radius : float
         Over R0, the outer radius; between 0 and 1.
     elements, ratio : int, float
-        Number of elements, and the size of the outermost over that of the innermost.
+        Number of elements, and the size of the outermost over the size of the innermost.
     inner, outer : str
         How the edges are held, see :mod:`.supports`; a ``hub`` is a rigid disc of the inner radius.
 
@@ -131,9 +136,9 @@ class Cap(_Graded):
     Parameters
     ----------
     height : float
-        Of the apex over the plane of the rim, in R0; negative: the cap hangs below it as a bowl, whose inside is above; 0: flat.
+        Height of the apex over the plane of the rim, in R0. A negative height makes a bowl, whose inside is above; 0 makes a flat disc.
     elements, ratio : int, float
-        Number of elements, and the size of that at the rim over that of that at the apex.
+        Number of elements, and the size of the element at the rim over the size of the element at the apex.
     rim : str
         How the rim is held, see :mod:`.supports`.
 
@@ -187,7 +192,7 @@ class Sphere(_Graded):
     Parameters
     ----------
     elements, ratio : int, float
-        Number of elements, and the size of that at the lower pole over that of that at the upper one.
+        Number of elements, and the size of the element at the lower pole over the size of the element at the upper pole.
 
     Raises
     ------
@@ -221,7 +226,7 @@ class Cylinder(_Graded):
     length : float
         Over R0, the radius.
     elements, ratio : int, float
-        Number of elements, and the size of the lowest over that of the topmost.
+        Number of elements, and the size of the lowest over the size of the topmost.
     top, bottom : str
         How the ends are held, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
 
@@ -263,7 +268,7 @@ class Torus:
     Parameters
     ----------
     aspect : float
-        Radius of the circle through the middle of the tube over that of the tube, R0; > 1.
+        Radius of the circle through the middle of the tube, over the radius R0 of the tube; > 1.
     elements : int
         Number of elements around the tube, all equal; at least 3.
 
@@ -293,7 +298,12 @@ class Torus:
         return np.cos(s), -np.sin(s)
 
     def with_elements(self, elements: int) -> Self:
-        """The same shape with another number of elements."""
+        """The same shape with another number of elements.
+
+        Parameters
+        ----------
+        elements : int
+        """
         return replace(self, elements=elements)
 
     def refined(self) -> Self:
@@ -304,27 +314,164 @@ class Torus:
 
 
 def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: str = "hub", outer: str = "clamped") -> Annulus:
-    """Mesh of a flat ring; see :class:`Annulus`."""
+    """Mesh of a flat ring.
+
+    Parameters
+    ----------
+    inner_radius : float
+        Over R0, the outer radius; between 0 and 1.
+    elements : int
+    ratio : float
+        Size of the outermost element over the size of the innermost.
+    inner, outer : str
+        How the edges are held, see :mod:`.supports`; a ``hub`` is a rigid disc of the inner radius.
+
+    Returns
+    -------
+    Annulus
+
+    Raises
+    ------
+    InputError
+        As for :class:`Annulus`.
+
+    Examples
+    --------
+    A force of 1 lifts the hub in the middle of the ring:
+
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.annulus(0.3, elements=16), loads=[fm.HubForce(1.0)])
+    >>> round(fm.equilibrium(scene, pressure=0.0).center_height, 4)
+    0.4152
+    """
     return Annulus(inner_radius=inner_radius, elements=elements, ratio=ratio, inner=inner, outer=outer)
 
 
 def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: str = "clamped") -> Cap:
-    """Mesh of a spherical cap; see :class:`Cap`."""
+    """Mesh of a spherical cap over a rim of unit radius.
+
+    Parameters
+    ----------
+    height : float
+        Height of the apex over the plane of the rim, in R0; a negative height makes a bowl.
+    elements : int
+    ratio : float
+        Size of the element at the rim over the size of the element at the apex.
+    rim : str
+        How the rim is held, see :mod:`.supports`.
+
+    Returns
+    -------
+    Cap
+
+    Raises
+    ------
+    InputError
+        As for :class:`Cap`.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.cap(height=0.5, elements=16))
+    >>> eq = fm.equilibrium(scene, volume=1.5)
+    >>> print(f"P = {eq.pressure:.4f}, apex at {eq.center_height:.4f}")
+    P = 1.1348, apex at 0.7625
+    """
     return Cap(height=height, elements=elements, ratio=ratio, rim=rim)
 
 
 def sphere(elements: int = ELEMENTS, ratio: float = 1.0) -> Sphere:
-    """Mesh of a closed sphere; see :class:`Sphere`."""
+    """Mesh of a closed sphere of unit radius.
+
+    Parameters
+    ----------
+    elements : int
+    ratio : float
+        Size of the element at the lower pole over the size of the element at the upper pole.
+
+    Returns
+    -------
+    Sphere
+
+    Raises
+    ------
+    InputError
+        As for :class:`Sphere`.
+
+    Examples
+    --------
+    A neo-Hookean balloon of radius l has the pressure 2 (1/l - 1/l^7):
+
+    >>> from math import pi
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.sphere(elements=8), degree=4)
+    >>> print(f"{fm.equilibrium(scene, volume=4 / 3 * pi * 1.2**3).pressure:.5f}, exact {2 * (1 / 1.2 - 1 / 1.2**7):.5f}")
+    1.10850, exact 1.10850
+    """
     return Sphere(elements=elements, ratio=ratio)
 
 
 def cylinder(length: float, elements: int = ELEMENTS, ratio: float = 1.0, top: str = "clamped", bottom: str = "clamped") -> Cylinder:
-    """Mesh of a tube; see :class:`Cylinder`."""
+    """Mesh of a tube of unit radius about the axis.
+
+    Parameters
+    ----------
+    length : float
+        Over R0, the radius.
+    elements : int
+    ratio : float
+        Size of the lowest element over the size of the topmost.
+    top, bottom : str
+        How the ends are held, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
+
+    Returns
+    -------
+    Cylinder
+
+    Raises
+    ------
+    InputError
+        As for :class:`Cylinder`.
+
+    Examples
+    --------
+    A tube with a rigid lid at its top, which the pressure lifts from the height 1:
+
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.cylinder(length=2.0, elements=16, top="hub"))
+    >>> eq = fm.equilibrium(scene, volume=8.0)
+    >>> print(f"P = {eq.pressure:.4f}, lid at {eq.center_height:.4f}")
+    P = 0.5121, lid at 1.0387
+    """
     return Cylinder(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom)
 
 
 def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
-    """Mesh of a torus; see :class:`Torus`."""
+    """Mesh of a torus with a round tube of unit radius.
+
+    Parameters
+    ----------
+    aspect : float
+        Radius of the circle through the middle of the tube, over the radius R0 of the tube; > 1.
+    elements : int
+        Number of elements around the tube, all equal; at least 3.
+
+    Returns
+    -------
+    Torus
+
+    Raises
+    ------
+    InputError
+        As for :class:`Torus`.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.torus(aspect=3.0, elements=16))
+    >>> print(f"{fm.equilibrium(scene, pressure=0.3).volume:.3f}")
+    70.871
+    """
     return Torus(aspect=aspect, elements=elements)
 
 

@@ -1,10 +1,10 @@
 """Finite-element space on a meridian, as plain arrays.
 
 scikit-fem supplies elements, degrees of freedom, quadrature and the map from the reference element; what leaves this room is NumPy
-only. Unknowns are the coefficients of the displacement (u, w), numbered along the meridian and interleaved, so that every matrix of the
-problem is banded with half bandwidth 2 degree + 1; those of a closed curve are numbered as if it were folded flat, which doubles the
-bandwidth. Points are numbered quadrature point first, element second: with arrays of shape
-(rows * n_quadrature, n_elements) gathering, evaluating and assembling are one matrix product each.
+only. Unknowns are the coefficients of the displacement (u, w), numbered along the meridian and interleaved. So every matrix of the problem
+is banded with half bandwidth 2 degree + 1. The unknowns of a closed curve are numbered as if it were folded flat, which doubles the
+bandwidth. Points are numbered quadrature point first, element second: with arrays of shape (rows * n_quadrature, n_elements) gathering,
+evaluating and assembling are one matrix product each.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .numbering import Numbering
 #: pairs (i, j) of the local variables (u, u_x, w, w_x) in the order of Hessian entries
 HESSIAN_PAIRS: tuple[tuple[int, int], ...] = tuple(combinations_with_replacement(range(4), 2))
 
-#: deviation of a mesh from its mirror image, relative to its size, that counts as none
+#: deviation of a mesh from its mirror image, relative to its size, that counts as zero
 _MIRRORED = 1e-6
 #: highest degree at which slopes are recovered from the Gauss points
 _RECOVERED = 3
@@ -35,7 +35,7 @@ _RECOVERED = 3
 class Space(Numbering):
     """Displacements (u, w) of one degree on one meridian: their values from coefficients, and integrals against their shape functions.
 
-    Parameters and further attributes are those of :class:`.numbering.Numbering`.
+    Parameters and further attributes: see :class:`.numbering.Numbering`.
 
     Attributes
     ----------
@@ -168,9 +168,8 @@ class Space(Numbering):
         return self.assemble_band(density.reshape(-1, self.n_elements))
 
     def interpolate(self, u: Array, w: Array) -> Array:
-        """Free coefficients of the interpolant of displacements given at :meth:`interpolation_points`, both of that shape.
-
-        Where the membrane is pinned along the axis, less the rigid motion that takes the pin away from its place.
+        """Free coefficients of the interpolant of displacements (u, w) given at :meth:`interpolation_points`. Where the membrane is pinned
+        along the axis, the rigid motion that would move the pin is taken out.
         """
         inverse = self.from_values
         x = np.zeros(self.n_free + 1)
@@ -180,7 +179,7 @@ class Space(Numbering):
         return x[: self.n_free]
 
     def mirrored(self, x: Array) -> list[Array]:
-        """Coefficients of the mirror image across the middle of the meridian, in a list; none where the mesh is not its own image."""
+        """Coefficients of the mirror image across the middle of the meridian, in a list; the list is empty if the mesh is not symmetric."""
         s = self.interpolation_points()
         R, Z = self.mesh.position(s)
         low, size = float(Z.min() + Z.max()), float(max(np.ptp(R), np.ptp(Z)))
@@ -190,7 +189,7 @@ class Space(Numbering):
         return [self.interpolate(u, -w)]
 
     def _at_pin(self, w: Array) -> float:
-        """What the interpolant of values at the interpolation points is at the node that is held along the axis."""
+        """Value of the interpolant at the node that is held along the axis."""
         element = cast(int, self.pin) // self.degree
         return float(w[0, element] if element < self.n_elements else w[-1, -1])
 
@@ -201,7 +200,7 @@ class Space(Numbering):
         return np.linalg.inv(values).astype(np.float64, copy=False)
 
     def evaluate(self, x: Array, s: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """(u, u_s, w, w_s) at parameters s, slopes with respect to s; at an element end those of the element that starts there."""
+        """(u, u_s, w, w_s) at parameters s, slopes with respect to s. At an element end the element that starts there gives the slopes."""
         element, xi = self.locate(s)
         value, slope = self.shape_functions(xi)
         coefficients = self.extend(x)[self.gather[:, element]]
@@ -221,8 +220,8 @@ class Space(Numbering):
     def kinks(self, x: Array) -> Array:
         """Jumps of the deformed meridian's slope, relative to the smaller of both sides: where elements meet, then at the poles.
 
-        The slope is that with respect to arc length at rest, a vector as long as the meridional stretch. At a pole it is compared with its
-        mirror image. What is kinked at rest counts only as far as it is more kinked now.
+        The slope is taken with respect to arc length at rest: a vector as long as the meridional stretch. At a pole it is compared with its
+        mirror image. A kink at rest counts only as far as it has grown.
 
         Returns
         -------
@@ -265,9 +264,9 @@ class Space(Numbering):
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.
 
-        The slope of a finite-element solution of degree p is superconvergent at the p Gauss points of an element. A polynomial through
-        those of two neighbours gives the slope at the end they share, one through the ends and the Gauss points of an element the rest.
-        From degree 4 on the slopes themselves are the better ones at pole and rim (measured), and are returned as they are.
+        The slope of a finite-element solution of degree p is superconvergent at the p Gauss points of an element. A polynomial through the
+        points of two neighbours gives the slope at the end they share. A polynomial through the ends and the Gauss points of an element
+        gives the rest. From degree 4 on the slopes themselves are the better ones at pole and rim (measured), and are returned as they are.
         """
         element, xi = self.locate(s)
         if self.n_elements == 1 or self.degree > _RECOVERED:
@@ -303,7 +302,7 @@ def space_of_scene(scene: Any) -> Space:
 
 
 def anchored(scene: Any) -> frozenset[str]:
-    """In which directions something outside the membrane of a scene sees where it is: a source or load, unless it does nothing."""
+    """Directions in which the place of the membrane matters to the sources and loads of a scene that do something."""
     acting = [*acting_sources(scene.sources, scene.susceptibility), *(load for load in scene.loads if load.acts)]
     return frozenset().union(*(part.sees for part in acting))
 

@@ -69,7 +69,7 @@ def check_support(key: str, name: str) -> None:
 
 
 def as_support(held: Support | frozenset[str]) -> Support:
-    """A support, from one or from the displacements that it holds."""
+    """A support, from a support or from the displacements that it holds."""
     return held if isinstance(held, Support) else Support(held)
 
 
@@ -79,7 +79,7 @@ def floats(ends: Sequence[Support]) -> bool:
 
 
 def free_rotations(ends: Sequence[Support], radii: Array, heights: Array) -> tuple[bool, bool]:
-    """Rigid motions across the axis that the supports leave: whether there is one that shifts only, and one that tilts.
+    """Rigid motions across the axis that the supports leave: whether a pure shift is left, and whether a tilt is left.
 
     A shift by A and a tilt by B displace the points of a meridian by (a, c, b) = (A + B eta, -A - B eta, -B rho) cos or sin theta.
     """

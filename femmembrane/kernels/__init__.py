@@ -1,9 +1,8 @@
-"""What computes, in two implementations: NumPy with LAPACK, and C where a compiler was found on installation.
-
-Kernels know no scene and decide nothing: they evaluate, assemble, factor and multiply, and tolerances are handed to them. Iterations and
-decisions are written once, in Python, over the interface of :mod:`.interface`. Which implementation answers is said here and nowhere else.
-Without the extension module ``femmembrane._native`` (sources in ``compiled/``), or with ``FEMMEMBRANE_COMPILED=0`` in the environment,
-everything runs in NumPy and gives the same answers to round-off.
+"""Kernels in two implementations: NumPy with LAPACK, and C where a compiler was found on installation. Kernels know no scene and decide
+nothing. They evaluate, assemble, factor and multiply, and tolerances are handed to them. Iterations and decisions are written once, in
+Python, over the interface of :mod:`.interface`. This module alone chooses the implementation. Without the extension module
+``femmembrane._native`` (sources in ``compiled/``), or with ``FEMMEMBRANE_COMPILED=0`` in the environment, everything runs in NumPy and
+gives the same answers to round-off.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from .numpy_kernels import NumpyKernels
 if TYPE_CHECKING:
     from .. import _native
 
-#: what the sources in ``compiled/`` answer; raised there and here when arguments or answers change
+#: version of the interface, as the sources in ``compiled/`` state it; raised there and here when arguments or answers change
 INTERFACE = 3
 
 
@@ -32,7 +32,7 @@ class CompiledKernels:
 
     @classmethod
     def load(cls, otherwise: NumpyKernels) -> CompiledKernels | None:
-        """The kernels of the extension module that is there; one that an earlier state of the sources left behind is as good as none."""
+        """The kernels of the extension module. A module that was built from earlier sources is not used."""
         try:
             module = importlib.import_module("femmembrane._native")
         except ImportError:

@@ -120,7 +120,7 @@ class Pencil(Protocol):
     compliance: float
 
     def below(self, value: float, mode: Array) -> int:
-        """Number of eigenvalues clearly below that of a mode."""
+        """Number of eigenvalues clearly below the eigenvalue of a mode."""
 
     def rayleigh(self, mode: Array) -> tuple[float, Array, float] | None:
         """Eigenvalue, mode and error that the iterations lead to."""

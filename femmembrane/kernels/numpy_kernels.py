@@ -29,12 +29,13 @@ class NumpyKernels:
         return blas.dsbmv(half_bandwidth, 1.0, band[half_bandwidth : 2 * half_bandwidth + 1], x)
 
     def inner(self, band: Array, half_bandwidth: int, x: Array, y: Array) -> float:
-        with np.errstate(over="ignore", invalid="ignore"):  # a prediction may be absurd; whoever asked sees it by the size
+        with np.errstate(over="ignore", invalid="ignore"):  # a prediction may be absurd; the caller sees it by the size
             return float(x @ self.product(band, half_bandwidth, y))
 
     def inertia(self, band: Array, half_bandwidth: int, constraint: Array | None, compliance: float) -> int:
-        """A few unknowns are pinned until the rest is positive definite (Cholesky), and the count is that of the Schur complement on the
-        pinned ones (Haynsworth's inertia additivity, a block L D L^T)."""
+        """A few unknowns are pinned until the rest is positive definite (Cholesky). The negative eigenvalues are then counted in the Schur
+        complement on the pinned unknowns (Haynsworth's inertia additivity, a block L D L^T).
+        """
         return _pinned_count(band, half_bandwidth, constraint, compliance)
 
     def rayleigh(self, pencil: Pencil, guess: Array, tolerances: Rayleigh) -> tuple[float, Array, float] | None:
@@ -57,7 +58,7 @@ class NumpyElements:
     def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
         out = self._point.replay(self._space.at_quadrature(x), np.array([pressure, factor]))
         densities = out[N_SUMS:]
-        with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy NaN is the answer, and the caller's to judge
+        with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy the answer is NaN, which the caller judges
             elastic, magnetic, volume = out[:N_SUMS].sum(axis=1).tolist()
             gradients = self._space.assemble_vectors(densities[:N_FORCE].reshape(self._force_shape))
         finite = bool(np.isfinite(gradients).all() and np.isfinite(densities[N_FORCE : N_FORCE + N_STIFFNESS]).all())
@@ -136,9 +137,9 @@ def _pinned_count(band: Array, kd: int, constraint: Array | None, compliance: fl
 
 @lru_cache(maxsize=64)
 def _spread(n: int, count: int) -> np.ndarray:
-    """Unknowns to pin, spread evenly; the first ones belong to the pole.
+    """Unknowns to pin, spread evenly. The first of them belong to the pole.
 
-    Many are pinned in pairs of neighbours, u and w of one node: evenly spaced ones may all be of one kind, and leave the other free.
+    Many unknowns are pinned in pairs, u and w of one node: evenly spaced unknowns may all be of one kind, and leave the other kind free.
     """
     if count <= 4:
         return np.unique(np.linspace(0, n - 1, 2 * count + 1)[:-1:2].astype(int)) if count else np.zeros(0, dtype=int)
@@ -157,7 +158,7 @@ def _couplings(n: int, kd: int, count: int) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _pin(upper: Array, count: int) -> Array:
-    """Upper band storage with the rows and columns of the pins replaced by those of the identity."""
+    """Upper band storage with the rows and columns of the pins replaced by rows and columns of the identity."""
     if not count:
         return upper
     pinned, kd, n = upper.copy(order="F"), upper.shape[0] - 1, upper.shape[1]
@@ -183,7 +184,7 @@ def _sparse_count(band: Array, kd: int, constraint: Array | None, compliance: fl
     matrix = sparse.dia_array((band[kd:], np.arange(kd, -kd - 1, -1)), shape=(n, n)).tocsc()
     try:
         lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except RuntimeError:  # exactly singular: directions without stiffness, such as those of the flat unloaded disc, are not negative ones
+    except RuntimeError:  # exactly singular: directions without stiffness, as the flat unloaded disc has them, are not negative
         nudge = np.finfo(float).eps * np.abs(band).max() * sparse.eye_array(n, format="csc")
         lu = splu(matrix + nudge, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     count = int((lu.U.diagonal() < 0).sum())

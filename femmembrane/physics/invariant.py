@@ -4,7 +4,7 @@ With p_i = expm1(2 e_i), J is a product form without cancellation (:class:`.mate
 
     dJ/de_1 = 2 (p_1 - p_3)        s_i = f' dJ/de_i        d(s_i)/d(e_j) = f'' dJ/de_i dJ/de_j + f' d^2 J/(de_i de_j)
 
-The Baker-Ericksen inequality, (s_1 - s_2)/(lambda_1 - lambda_2) > 0, is f'(J) > 0 at every J >= 0: every class below demands it.
+The Baker-Ericksen inequality (1954), (s_1 - s_2)/(lambda_1 - lambda_2) > 0, means f'(J) > 0 at every J >= 0. Every class below demands it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ class InvariantMaterial:
     """What the classes below share: from f to stress and tangent."""
 
     def function(self, J: Any) -> tuple[Any, Any, Any]:
-        """(f, f', f'') at J >= 0."""
+        """(f, f', f'') at J >= 0.
+
+        Parameters
+        ----------
+        J : float, ndarray or CasADi symbol
+            I_1 - 3.
+        """
         raise NotImplementedError
 
     def energy(self, e1: Any, e2: Any) -> Any:
@@ -45,19 +51,19 @@ class InvariantMaterial:
         return a * t11 + b * s1 * s1, a * t12 + b * s1 * s2, a * t22 + b * s2 * s2
 
     def _at(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
-        with np.errstate(all="ignore"):  # beyond locking NaN is the answer, beyond the range of a float infinity
+        with np.errstate(all="ignore"):  # the answer is NaN beyond locking, and infinite beyond the range of a float
             return self.function(2 * _DOUBLE.energy(e1, e2))
 
 
 @dataclass(frozen=True)
 class Yeoh(InvariantMaterial):
-    """Yeoh's strain energy W = J/2 + c_2 J^2 + c_3 J^3 with J = I_1 - 3.
+    """Yeoh's strain energy W = J/2 + c_2 J^2 + c_3 J^3 with J = I_1 - 3 (Yeoh, Rubber Chem. Technol. 66, 1993).
 
     Parameters
     ----------
     c2, c3 : float
-        In units of the shear modulus. c_2 may be negative (softening) as long as c_3 makes up for it: f' = 1/2 + 2 c_2 J + 3 c_3 J^2 is
-        positive at every J >= 0 when c_3 >= 0 and c_2 >= 0, or 2 c_2^2 < 3 c_3.
+        In units of the shear modulus. f' = 1/2 + 2 c_2 J + 3 c_3 J^2 must be positive at every J >= 0. So c_3 must not be negative. c_2 may
+        be negative (softening) as long as 2 c_2^2 < 3 c_3.
 
     Raises
     ------
@@ -85,17 +91,27 @@ class Yeoh(InvariantMaterial):
 
 @dataclass(frozen=True)
 class Gent(InvariantMaterial):
-    """Gent's strain energy W = -J_m/2 log(1 - J/J_m), which locks at J = I_1 - 3 = J_m and is NaN beyond.
+    """Gent's strain energy W = -J_m/2 log(1 - J/J_m) (Gent, Rubber Chem. Technol. 69, 1996).
+
+    The material locks at J = I_1 - 3 = J_m, and W is NaN beyond.
 
     Parameters
     ----------
     jm : float
-        J_m > 0; infinitely large, it is neo-Hookean. Rubber has 30 to 100, soft tissue 0.4 to 5.
+        J_m > 0. Rubber has 30 to 100, soft tissue 0.4 to 5; the material tends to neo-Hookean as J_m grows.
 
     Raises
     ------
     InputError
         For a number that is not positive: the membrane would be locked at rest.
+
+    Examples
+    --------
+    Strains of 0.5 cost more as the material comes closer to locking, and are impossible beyond:
+
+    >>> import femmembrane as fm
+    >>> [round(float(fm.Gent(jm).energy(0.5, 0.5)), 4) for jm in (1e6, 30.0, 3.0, 2.0)]
+    [1.286, 1.3444, 2.9205, nan]
     """
 
     jm: float
@@ -119,13 +135,13 @@ _CHAIN = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
 class ArrudaBoyce(InvariantMaterial):
     """Eight-chain model of Arruda and Boyce (J. Mech. Phys. Solids 41, 1993): the five-term series of the inverse Langevin function.
 
-    W = mu' sum_i C_i/N^(i-1) (I_1^i - 3^i), C = (1/2, 1/20, 11/1050, 19/7000, 519/673750), mu' so that the shear modulus is 1. Cut off
-    after five terms it stiffens, but does not lock.
+    W = mu' sum_i C_i/N^(i-1) (I_1^i - 3^i) with C = (1/2, 1/20, 11/1050, 19/7000, 519/673750); mu' makes the shear modulus 1. The series of
+    five terms stiffens, but does not lock.
 
     Parameters
     ----------
     links : float
-        Links N > 1 of a chain, stretched to 1/sqrt(N) of its length at rest; infinitely many are neo-Hookean.
+        Links N > 1 of a chain. At rest a chain is as long as sqrt(N) of its links; the material tends to neo-Hookean as N grows.
 
     Raises
     ------
@@ -153,12 +169,12 @@ class ArrudaBoyce(InvariantMaterial):
 
 @dataclass(frozen=True)
 class Fung(InvariantMaterial):
-    """Fung's exponential strain energy in its isotropic form, W = (exp(b J) - 1)/(2 b) with J = I_1 - 3.
+    """Fung's exponential strain energy in its isotropic form, W = (exp(b J) - 1)/(2 b) with J = I_1 - 3 (Fung 1967, Demiray 1972).
 
     Parameters
     ----------
     b : float
-        Rate of stiffening b > 0; infinitely small, it is neo-Hookean.
+        Rate of stiffening b > 0; the material tends to neo-Hookean as b falls to 0.
 
     Raises
     ------

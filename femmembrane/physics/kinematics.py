@@ -6,8 +6,9 @@ The meridian is a curve s -> (R, Z), displaced by (u, w) to (rho, eta) = (R + u,
     lambda_2 = rho / R                                circumferential
     lambda_3 = 1 / (lambda_1 lambda_2)                thickness (incompressible)
 
-Everything is written in logarithmic (Hencky) strains e_i = log lambda_i, from displacements and through log1p, so that strains far below
-round-off of 1 (a nearly flat membrane has strains of order V^2) keep their relative accuracy.
+Everything is written in logarithmic strains e_i = log lambda_i (Hencky 1928), from displacements and through log1p. So strains far below
+round-off of 1 keep their relative accuracy; a nearly flat membrane has strains of order V^2. Axisymmetric membranes: A. E. Green and
+J. E. Adkins, Large Elastic Deformations (1960).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-#: a point that a solver tries may lie beyond the axis, or on a point: its strains are infinite or NaN, which whoever tries it sees
+#: a solver may try a state with points beyond the axis or on each other: its strains are infinite or NaN, and the solver steps back
 _anywhere = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
 

@@ -1,12 +1,16 @@
 """Work of the inflating pressure, and loads besides it.
 
-A load is conservative and does not depend on the angle around the axis: its energy, in units of mu T R0^2, is a function f of the position
-per reference area and a function g of the height per area projected onto the plane of the rim::
+A load is conservative and does not depend on the angle around the axis. Its energy, in units of mu T R0^2, has up to three parts: a
+function f of the position, per reference area; a function g of the height, per area projected onto the plane of the rim; and a function of
+the heights of rigid hubs::
 
-    E = Int f(rho, eta) R dS + Int g(eta) rho d rho,      both with the 2 pi
+    E = Int f(rho, eta) R dS + Int g(eta) rho d rho + E_hubs,      the integrals with the 2 pi
 
-where an area counts as positive as the volume over it does, so that g acts like the pressure -g'(eta), and a function of the heights of
-rigid hubs. A new load is a class here with one of these, and a line in the registry of scenes.
+A projected area has the sign of the volume over it, so that g acts like the pressure -g'(eta). A new load is a class here with one of these
+parts, and a line in the registry of scenes.
+
+Volume and work of the pressure: Saxena et al. (2019), eq. 17. That such pressures have a potential: M. J. Sewell, Arch. Rational Mech.
+Anal. 23 (1967); K. Schweizerhof and E. Ramm, Comput. Struct. 18 (1984).
 """
 
 from __future__ import annotations
@@ -22,8 +26,8 @@ from ..errors import InputError
 def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:
     """Integrand of the enclosed volume over 2 pi: V = 2 pi Int rho rho_s eta ds, signed (paper eq. 17).
 
-    It is that between the membrane and the plane z = 0, where every end is a pole or stays in that plane; with the other sign where the
-    inside is on the left of the meridian (:func:`~femmembrane.discretization.meridian.side`).
+    It counts the volume between the membrane and the plane z = 0, for a membrane whose ends are poles or stay in that plane. Its sign turns
+    where the inside is on the left of the meridian (:func:`~femmembrane.discretization.meridian.side`).
     """
     return rho * rho_s * eta
 
@@ -31,14 +35,17 @@ def volume_density(rho: Any, rho_s: Any, eta: Any) -> Any:
 def lidded_volume_density(rho: Any, eta_s: Any) -> Any:
     """Integrand over 2 pi of the volume between the membrane and flat lids across its ends, wherever these are.
 
-    By parts 2 pi Int rho rho_s eta ds + pi [-rho^2 eta] = -pi Int rho^2 eta_s ds; a shift along the axis changes nothing of it. The force
+    By parts 2 pi Int rho rho_s eta ds + pi [-rho^2 eta] = -pi Int rho^2 eta_s ds, which a shift along the axis does not change. The force
     of the pressure on a lid, pi rho^2 P, acts on the end, along the axis.
     """
     return -(rho**2) * eta_s / 2
 
 
 def wall_density(wall: Any, wall_s: Any, w: Any, w_s: Any) -> Any:
-    """Integrand over 2 pi of pi [wall w]: what takes the lid of an end that slides along a wall back to where the end was at rest."""
+    """Integrand over 2 pi of pi [wall w].
+
+    An end that slides along a wall carries its lid with it. This term moves the lid back to where the end was at rest.
+    """
     return (wall * w_s + wall_s * w) / 2
 
 
@@ -52,10 +59,10 @@ def hub_density(forces: tuple[Any, Any], hub: Any, hub_s: Any, z: Any, z_s: Any)
 
 
 class Load:
-    """A load besides the pressure: no load at all, unless a method says otherwise."""
+    """A load besides the pressure. A load of your own derives from this class and overrides one of its methods."""
 
-    #: motions of the membrane as a whole on which it works, alone or beside the pressure: "along" the axis, a "shift" across it, and a
-    #: "tilt" about a diameter; what pulls down pulls alike wherever the membrane is shifted to
+    #: motions of the whole membrane on which the load does work, alone or beside the pressure: "along" the axis, a "shift" across it, a
+    #: "tilt" about a diameter; a weight does none in a shift, since it pulls alike everywhere
     sees: frozenset[str] = frozenset({"along", "tilt"})
 
     @property
@@ -64,15 +71,33 @@ class Load:
         return True
 
     def over_reference(self, rho: Any, eta: Any) -> Any:
-        """f(rho, eta): energy per reference area."""
+        """f(rho, eta): energy per reference area.
+
+        Parameters
+        ----------
+        rho, eta : ndarray or CasADi symbol
+            Radius and height of the point, over R0.
+        """
         return 0.0
 
     def over_projection(self, eta: Any) -> tuple[Any, Any, Any]:
-        """(g, g', g'') at a height: energy per projected area with its derivatives."""
+        """(g, g', g'') at a height: energy per projected area with its derivatives.
+
+        Parameters
+        ----------
+        eta : ndarray or CasADi symbol
+            Height of the point, over R0.
+        """
         return 0.0, 0.0, 0.0
 
     def on_hubs(self, hubs: Sequence[bool]) -> tuple[Any, Any]:
-        """Force along the axis on the first and the last end; ``hubs`` tells which of them are rigid hubs."""
+        """Force along the axis on the first and the last end.
+
+        Parameters
+        ----------
+        hubs : sequence of bool
+            Which of the ends are rigid hubs.
+        """
         return 0.0, 0.0
 
 
@@ -80,18 +105,30 @@ class Load:
 class Hydrostatic(Load):
     """A liquid inside the membrane: under a disc or a dome, in a bowl, always with its weight downwards.
 
-    P is the pressure at the height of the rim, and P - gamma eta that at the height eta: E = gamma Int eta dV. Inside is what the reference
-    shape encloses, and below where it is flat (:mod:`~femmembrane.discretization.meridian`).
+    The pressure is P at the height of the rim and P - gamma eta at the height eta, so that E = gamma Int eta dV. Inside is the space that
+    the reference shape encloses; of a flat shape it is below (:mod:`~femmembrane.discretization.meridian`).
 
     Parameters
     ----------
     gamma : float
-        rho g R0^2/(mu T), rho the density of the liquid less that of what is outside; negative where the liquid is lighter.
+        rho g R0^2/(mu T), where rho is the density inside minus the density outside. It is negative for a light liquid or gas.
 
     Raises
     ------
     InputError
         For a number that is not finite.
+
+    Examples
+    --------
+    A disc carries a bulge of volume 1 against the weight of a liquid below it:
+
+    >>> import femmembrane as fm
+    >>> plain = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16))
+    >>> filled = plain.replace(loads=[fm.Hydrostatic(gamma=0.5)])
+    >>> for scene in (plain, filled):
+    ...     print(f"{fm.equilibrium(scene, volume=1.0).pressure:.4f}")
+    1.0669
+    1.2519
     """
 
     gamma: float
@@ -114,7 +151,7 @@ class Weight(Load):
     Parameters
     ----------
     weight : float
-        w = rho_m g R0/mu, rho_m the mass density of the membrane; it pulls downwards, against the axis, when positive.
+        w = rho_m g R0/mu, with rho_m the mass density of the membrane. A positive weight pulls downwards, against the axis.
 
     Raises
     ------
@@ -137,19 +174,19 @@ class Weight(Load):
 
 @dataclass(frozen=True)
 class HubForce(Load):
-    """A force along the axis on a rigid hub, dead: E = -F times the height of the hub.
+    """A dead force along the axis on a rigid hub: E = -F times the height of the hub.
 
     Parameters
     ----------
     force : float
         F over mu T R0; it lifts the hub, along the axis, when positive.
     hub : {"first", "last"}, optional
-        Which hub of two, as the meridian runs (of a cylinder the first is its top); left out: the only one.
+        Which of two hubs, as the meridian runs; the first hub of a cylinder is its top. Left out: the only hub.
 
     Raises
     ------
     InputError
-        For a number that is not finite and for another word; a scene refuses it where the shape has no such hub.
+        For a number that is not finite, and for another word. A scene refuses the load where its shape has no such hub.
     """
 
     force: float
@@ -167,7 +204,18 @@ class HubForce(Load):
         return not (is_number(self.force) and self.force == 0)
 
     def on_hubs(self, hubs: Sequence[bool]) -> tuple[Any, Any]:
-        """As :meth:`Load.on_hubs`; InputError where the hub is missing, or which of two is meant."""
+        """The force on the end that is the hub, and 0 on the other end.
+
+        Parameters
+        ----------
+        hubs : sequence of bool
+            Which of the ends are rigid hubs.
+
+        Raises
+        ------
+        InputError
+            Where there is no such hub, or there are two and ``hub`` is left out.
+        """
         places = [k for k, is_hub in enumerate(hubs) if is_hub and self.hub in (None, _HUBS[k])]
         if not places:
             raise InputError("load.hub", self.hub, 'there is no such hub; a shape with an end that is a hub is allowed (inner = "hub")')

@@ -1,9 +1,11 @@
 """Magnetic sources around the axis and the energy of a weakly magnetisable membrane in their field.
 
-Fields are in units of D/R0^3 with D^2 = mu R0^6/mu0, so that |h|^2 is in units of the shear modulus and a source of strength
-M = mu0 D^2/(R0^6 mu) contributes sqrt(M) times its unit field. Several sources superpose as fields::
+Fields are in units of D/R0^3 with D^2 = mu R0^6/mu0. So |h|^2 is in units of the shear modulus, and a source of strength
+M = mu0 D^2/(R0^6 mu) contributes sqrt(M) times its unit field. The fields of several sources add up::
 
     energy density = - chi/2 |sum_i h_i|^2        per reference area, in units of mu T    (paper eqs. 28-29, 33)
+
+"The paper" is here and elsewhere P. Saxena, N. H. Reddy and S. P. Pradhan, Int. J. Non-Linear Mech. 116 (2019).
 """
 
 from __future__ import annotations
@@ -26,47 +28,72 @@ _STRONGEST = 1e100
 
 
 class Source:
-    """A magnetic source whose field is the same all around the axis: everything the rest of the code asks of it.
+    """A magnetic source whose field is the same all around the axis, with everything that the rest of the code asks of it.
 
-    A source needs :meth:`field`; the rest has the answers of a field that is smooth everywhere.
+    A source of your own derives from this class and needs :meth:`field` alone. All other methods answer for a field that is smooth
+    everywhere.
     """
 
     #: (radius, height) of circles around the axis on which the field is singular
     circles: tuple[tuple[float, float], ...] = ()
-    #: motions of the membrane as a whole that change the intensity, alone or beside another source: "along" the axis, a "shift" across it,
-    #: and a "tilt" about a diameter
+    #: motions of the whole membrane that change the intensity: "along" the axis, a "shift" across it, a "tilt" about a diameter; a motion
+    #: counts if it changes the intensity beside another source
     sees: frozenset[str] = frozenset({"along", "shift", "tilt"})
     #: argument and advice for a field that is not finite on the undeformed membrane
     refusal = ("height", "the source lies on the membrane, where its field is singular; move it off")
 
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
-        """Magnetic field (h_rho, h_z, h_theta) at the deformed point (rho, eta), in units of sqrt(mu/mu0)."""
+        """Magnetic field (h_rho, h_z, h_theta) at a deformed point, in units of sqrt(mu/mu0).
+
+        Parameters
+        ----------
+        rho, eta : float, ndarray or CasADi symbol
+            Radius and height of the point, over R0.
+        """
         raise NotImplementedError
 
     def intensity(self, rho: Any, eta: Any) -> Any:
-        """|h|^2 of this source alone: where it can be written out, it may cost less than squaring the components."""
+        """|h|^2 of this source alone. A source whose |h|^2 can be written out overrides this, and saves the squares of the components.
+
+        Parameters
+        ----------
+        rho, eta : float, ndarray or CasADi symbol
+            Radius and height of the point, over R0.
+        """
         h_rho, h_z, h_theta = self.field(rho, eta)
         return h_rho**2 + h_z**2 + h_theta**2
 
     def distance_squared(self, rho: Any, eta: Any) -> Any:
-        """Squared distance from the nearest point where the field is singular, an array; infinite where there is none."""
+        """Squared distance from the nearest point where the field is singular; infinite where there is none.
+
+        Parameters
+        ----------
+        rho, eta : ndarray
+            Radii and heights of points, over R0.
+        """
         found = np.full(np.shape(rho), np.inf)
         for a, h in self.circles:
             found = np.minimum(found, (rho - a) ** 2 + (eta - h) ** 2)
         return found
 
     def passed(self, before: float, after: float) -> bool:
-        """Whether a point on the axis that moved between two heights went through the source."""
+        """Whether a point on the axis that moved between two heights went through the source.
+
+        Parameters
+        ----------
+        before, after : float
+            Heights over R0.
+        """
         return False
 
 
-#: a point that a solver tries may lie on the source, where the field has no bound: whoever tries it sees that
+#: a point that a solver tries may lie on the source, where the field is infinite: the solver sees that and steps back
 _anywhere = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
 
 @dataclass(frozen=True)
 class Dipole(Source):
-    """Point dipole on the axis with its moment along the axis.
+    """Point dipole on the axis with its moment along the axis (Saxena et al. 2019, eq. 33).
 
     Parameters
     ----------
@@ -81,6 +108,16 @@ class Dipole(Source):
     ------
     InputError
         For a negative or non-finite strength, a non-finite height, or an orientation other than 1 and -1.
+
+    Examples
+    --------
+    A dipole above a membrane that is not inflated draws it up:
+
+    >>> import femmembrane as fm
+    >>> dipole = fm.Dipole(strength=20.0, height=2.5)
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), sources=[dipole], susceptibility=1.0)
+    >>> print(f"{fm.equilibrium(scene, pressure=0.0).center_height:.4f}")
+    0.5635
     """
 
     strength: float
@@ -117,7 +154,11 @@ class Dipole(Source):
 
 
 def check_source(source: Any) -> None:
-    """Check the arguments that sources have in common, those that one has.
+    """Check those of the shared arguments (strength, height, radius, length, orientation) that a source has.
+
+    Parameters
+    ----------
+    source : Source
 
     Raises
     ------
@@ -138,7 +179,7 @@ def check_source(source: Any) -> None:
 
 
 def acting_sources(sources: Sequence[Source], susceptibility: Any) -> tuple[Source, ...]:
-    """Those that do something: a source of no strength is none, and no source acts on a membrane without susceptibility."""
+    """The sources that do something: without strength a source does nothing, and without susceptibility no source acts on a membrane."""
     return tuple(s for s in sources if getattr(s, "strength", 1.0) != 0) if susceptibility else ()
 
 
@@ -159,7 +200,7 @@ def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rh
 def swept(before: Array, after: Array, circle: tuple[float, float]) -> bool:
     """Whether a meridian that moved between two polylines, shape (2, n) each, went through a circle around the axis.
 
-    The circle was passed if it lies in the region between them, that is if one of the quadrilaterals winds around it.
+    The circle was passed if it lies in the region between the polylines: then one of the quadrilaterals winds around it.
     """
     corners = np.stack([before[:, :-1], before[:, 1:], after[:, 1:], after[:, :-1]]) - np.array(circle)[:, None]
     x, y = corners[:, 0], corners[:, 1]
@@ -170,7 +211,7 @@ def swept(before: Array, after: Array, circle: tuple[float, float]) -> bool:
 def distance_to_polyline(rho: Array, eta: Array, circle: tuple[float, float]) -> float:
     """Smallest distance of a point of the half-plane (a circle around the axis) from a meridian of straight pieces, shape (n,) each."""
     points = np.stack([rho, eta])
-    along = np.diff(points)  # before they are moved: beside a circle that is far away they would be one
+    along = np.diff(points)  # before the points are moved: far from the circle neighbours would round to one point
     ends = points - np.array(circle)[:, None]
     share = np.clip(-(ends[:, :-1] * along).sum(axis=0) / (along**2).sum(axis=0), 0, 1)
     return float(np.hypot(*(ends[:, :-1] + share * along)).min())

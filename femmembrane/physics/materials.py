@@ -4,7 +4,10 @@ A material is a function of the two in-plane logarithmic strains e_i = log lambd
 
     W(e_1, e_2),      lambda_i dW/dlambda_i = dW/de_i       the principal mechanical (Cauchy) stresses
 
-It must have W = 0 and dW/de = 0 at rest and shear modulus 1, that is W ~ e_1^2 + e_1 e_2 + e_2^2 to second order times 2.
+At rest it must have W = 0 and dW/de = 0. Its shear modulus must be 1, so that W = 2 (e_1^2 + e_1 e_2 + e_2^2) to second order.
+
+Sources: R. W. Ogden, Proc. R. Soc. Lond. A 326 (1972); H. Hencky, Z. techn. Phys. 9 (1928) for the strains; M. Baker and J. L. Ericksen,
+J. Wash. Acad. Sci. 44 (1954) for the inequality that the numbers must meet.
 """
 
 from __future__ import annotations
@@ -22,18 +25,36 @@ class Material(Protocol):
     """What the potential asks of a strain energy; works on NumPy arrays and CasADi symbols alike."""
 
     def energy(self, e1: Any, e2: Any) -> Any:
-        """W(e_1, e_2) in units of mu."""
+        """W(e_1, e_2) in units of mu.
+
+        Parameters
+        ----------
+        e1, e2 : float, ndarray or CasADi symbol
+            Logarithmic strains, meridional and circumferential.
+        """
 
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
-        """(dW/de_1, dW/de_2) = (lambda_1 W_1, lambda_2 W_2) in units of mu."""
+        """(dW/de_1, dW/de_2) = (lambda_1 W_1, lambda_2 W_2) in units of mu.
+
+        Parameters
+        ----------
+        e1, e2 : float, ndarray or CasADi symbol
+            Logarithmic strains, meridional and circumferential.
+        """
 
     def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
-        """Second derivatives (W_11, W_12, W_22) with respect to e_1 and e_2: half the cost of the potential is saved by closed forms."""
+        """Second derivatives (W_11, W_12, W_22) with respect to e_1 and e_2. Closed forms save half the cost of the potential.
+
+        Parameters
+        ----------
+        e1, e2 : float, ndarray or CasADi symbol
+            Logarithmic strains, meridional and circumferential.
+        """
 
 
 @dataclass(frozen=True)
 class Ogden:
-    """Ogden's strain energy with any number of terms (paper eq. 41).
+    """Ogden's strain energy with any number of terms (Ogden 1972; paper eq. 41).
 
     W = sum_k mu_k/alpha_k (lambda_1^alpha_k + lambda_2^alpha_k + (lambda_1 lambda_2)^-alpha_k - 3)
 
@@ -46,6 +67,16 @@ class Ogden:
     ------
     InputError
         When the lengths differ, a product is not positive, or the products do not sum to 2.
+
+    Examples
+    --------
+    Equal stretches of 2 in both directions, in rubber with two terms:
+
+    >>> from math import log
+    >>> import femmembrane as fm
+    >>> rubber = fm.Ogden(mu=(1.4, -0.1), alpha=(1.3, -1.8))
+    >>> round(float(rubber.stress(log(2), log(2))[0]), 4)
+    4.4001
     """
 
     mu: tuple[float, ...]
@@ -105,7 +136,7 @@ class Ogden:
 
 
 class OgdenForm:
-    """A material that is Ogden's with terms that follow from fewer numbers, which may be symbols."""
+    """Ogden's material with terms that follow from fewer numbers; these may be symbols."""
 
     def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
         """Moduli and exponents."""
@@ -129,7 +160,19 @@ class OgdenForm:
 
 @dataclass(frozen=True)
 class NeoHookean(OgdenForm):
-    """Neo-Hookean strain energy W = (lambda_1^2 + lambda_2^2 + lambda_3^2 - 3)/2: Ogden's with one term, mu = 1 and alpha = 2."""
+    """Neo-Hookean strain energy W = (lambda_1^2 + lambda_2^2 + lambda_3^2 - 3)/2 (Treloar 1943).
+
+    It is Ogden's energy with one term, mu = 1 and alpha = 2.
+
+    Examples
+    --------
+    Equal stretches of 2 in both directions: lambda^2 - lambda^-4 = 4 - 1/16.
+
+    >>> from math import log
+    >>> import femmembrane as fm
+    >>> round(float(fm.NeoHookean().stress(log(2), log(2))[0]), 4)
+    3.9375
+    """
 
     def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
         return (1.0,), (2.0,)
@@ -137,7 +180,7 @@ class NeoHookean(OgdenForm):
 
 @dataclass(frozen=True)
 class Varga(OgdenForm):
-    """Varga's strain energy W = 2 (lambda_1 + lambda_2 + lambda_3 - 3): Ogden's with one term, mu = 2 and alpha = 1."""
+    """Varga's strain energy W = 2 (lambda_1 + lambda_2 + lambda_3 - 3) (Varga 1966): Ogden's with one term, mu = 2 and alpha = 1."""
 
     def terms(self) -> tuple[tuple[Any, ...], tuple[float, ...]]:
         return (2.0,), (1.0,)
@@ -145,13 +188,15 @@ class Varga(OgdenForm):
 
 @dataclass(frozen=True)
 class MooneyRivlin(OgdenForm):
-    """Mooney-Rivlin strain energy W = C_1 (I_1 - 3) + C_2 (I_2 - 3) with 2 (C_1 + C_2) = 1, I_2 the sum of the lambda_i^-2.
+    """Mooney-Rivlin strain energy W = C_1 (I_1 - 3) + C_2 (I_2 - 3) (Mooney 1940, Rivlin 1948).
+
+    Here 2 (C_1 + C_2) = 1, and I_2 is the sum of the lambda_i^-2.
 
     Parameters
     ----------
     ratio : float
-        C_2/C_1 >= 0; 0 is neo-Hookean. The Baker-Ericksen inequality is C_1 + C_2 lambda_3^2 > 0 at every lambda_3: both moduli are
-        needed, so that a negative ratio is unstable at some stretch.
+        C_2/C_1 >= 0; 0 is neo-Hookean. The Baker-Ericksen inequality C_1 + C_2 lambda_3^2 > 0 must hold at every lambda_3. A negative ratio
+        breaks it at some stretch.
 
     Raises
     ------

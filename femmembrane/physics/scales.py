@@ -11,8 +11,8 @@ quantity               unit                  SI
 ``dipole_strength``    see below             A m^2
 =====================  ====================  =========
 
-A dipole strength corresponds to a physical moment m through M = mu0 D^2/(R0^6 mu) with D = m/(4 pi) (paper eq. 33), that is
-M = (m/m_0)^2 with m_0 = 4 pi R0^3 sqrt(mu/mu0).
+A dipole of the physical moment m has the strength M = mu0 D^2/(R0^6 mu) with D = m/(4 pi) (paper eq. 33). So M = (m/m_0)^2 with
+m_0 = 4 pi R0^3 sqrt(mu/mu0).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scales:
-    """The physical size, thickness and stiffness of a membrane.
+    """The physical size, thickness and stiffness of a membrane (units of Saxena et al. 2019, eq. 33).
 
     Parameters
     ----------
@@ -63,6 +63,15 @@ class Scales:
     ------
     InputError
         For a value that is not a finite number > 0, and when a unit that follows from them is beyond the range of a float.
+
+    Examples
+    --------
+    A membrane of rubber with a radius of 10 cm and a thickness of 1 mm; the unit of pressure is mu T/R0:
+
+    >>> import femmembrane as fm
+    >>> scales = fm.Scales(radius=0.1, thickness=1e-3, shear_modulus=4e5)
+    >>> round(scales.to_si("pressure", 1.5), 1), round(scales.from_si("length", 0.05), 3)
+    (6000.0, 0.5)
     """
 
     radius: float
@@ -108,6 +117,10 @@ class Scales:
     def units(quantity: str) -> str:
         """The SI unit of a quantity.
 
+        Parameters
+        ----------
+        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength"}
+
         Raises
         ------
         InputError
@@ -123,7 +136,7 @@ class Scales:
     def to_si(self, quantity: str, value: NDArray[Any] | Sequence[Any]) -> Array: ...
 
     def to_si(self, quantity: str, value: Any) -> float | Array:
-        """A non-dimensional value in SI units; of a dipole strength: the moment.
+        """A non-dimensional value in SI units. A dipole strength becomes a moment.
 
         Parameters
         ----------
@@ -152,13 +165,24 @@ class Scales:
     def from_si(self, quantity: str, value: NDArray[Any] | Sequence[Any]) -> Array: ...
 
     def from_si(self, quantity: str, value: Any) -> float | Array:
-        """The non-dimensional value of one in SI units: the inverse of :meth:`to_si`.
+        """A value in SI units as a non-dimensional number: the inverse of :meth:`to_si`.
+
+        Parameters
+        ----------
+        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength"}
+        value : float or array_like
+            In ``units(quantity)``; for a dipole strength, the moment.
+
+        Returns
+        -------
+        float or ndarray
+            In the units of the package, of the shape of ``value``.
 
         Raises
         ------
         InputError
-            For an unknown quantity, a value that is no number or too large for a float without its unit, or a negative moment (a dipole's
-            orientation holds its sense).
+            For an unknown quantity, a value that is no number or too large for a float without its unit, or a negative moment (the sense of
+            a moment is the orientation of its dipole).
         """
         given = _values(quantity, value)
         with np.errstate(over="ignore"):
@@ -166,7 +190,12 @@ class Scales:
             return _converted(value, given, ratio * ratio if quantity == "dipole_strength" else ratio)
 
     def fits(self, sources: Iterable[Any]) -> bool:
-        """Whether ``dipole_moment``, if given, is that of one of the sources, to 1e-9 of its strength."""
+        """Whether one of the sources has the moment ``dipole_moment``, to 1e-9 of its strength; true where no moment is given.
+
+        Parameters
+        ----------
+        sources : iterable of Source
+        """
         if self.dipole_moment is None:
             return True
         strengths = [source.strength for source in sources if isinstance(source, Dipole)]
@@ -207,5 +236,5 @@ def _values(quantity: str, value: Any) -> Array:
 
 def _converted(value: Any, given: Array, result: Any) -> float | Array:
     if (np.isinf(result) & np.isfinite(given)).any():
-        raise InputError("value", value, "a value is allowed that a float can hold in the other unit, too")
+        raise InputError("value", value, "a value is allowed that a float can hold in the other unit as well")
     return result if np.ndim(result) else float(result)

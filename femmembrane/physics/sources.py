@@ -1,7 +1,9 @@
 """Magnetic sources other than a dipole: coaxial loops and solenoids, a straight wire on the axis, a uniform field.
 
-A loop or solenoid of strength M has the moment of a dipole of that strength, and so its far field. With a the radius in units of R0 and I
-the current, the moment I pi (a R0)^2 of a loop gives M = mu0 (I a^2/(4 R0))^2/(R0^2 mu): the field at its centre is 2 sqrt(M)/a^3.
+A loop or solenoid of strength M has the moment of a dipole of that strength, and so its far field. Let a be the radius in units of R0 and I
+the current. The moment I pi (a R0)^2 of a loop then gives M = mu0 (I a^2/(4 R0))^2/(R0^2 mu), and the field at its centre is 2 sqrt(M)/a^3.
+
+Fields: J. D. Jackson, Classical Electrodynamics, 3rd ed. (1999), sections 5.2 and 5.5. The integrals of the loop: Bulirsch (1969).
 """
 
 from __future__ import annotations
@@ -22,12 +24,12 @@ _STEPS = 6
 
 @dataclass(frozen=True)
 class Loop(Source):
-    """Circular loop of current around the axis.
+    """Circular loop of current around the axis (Jackson 1999, section 5.5).
 
     Parameters
     ----------
     strength : float
-        M >= 0 of the dipole with its moment, see above.
+        M >= 0: the strength of a dipole with the same moment.
     height : float
         Signed height of its plane over the plane of the rim, in units of R0.
     radius : float
@@ -39,6 +41,14 @@ class Loop(Source):
     ------
     InputError
         For a negative strength, a radius that is not positive, another orientation, or numbers that are not finite.
+
+    Examples
+    --------
+    The field (h_rho, h_z, h_theta) at the centre, where h_z = 2 sqrt(M)/a^3:
+
+    >>> import femmembrane as fm
+    >>> [round(float(h), 4) for h in fm.Loop(strength=4.0, height=0.0, radius=0.5).field(0.0, 0.0)]
+    [0.0, 32.0, 0.0]
     """
 
     strength: float
@@ -67,19 +77,20 @@ class Loop(Source):
 class Solenoid(Source):
     """Thin coaxial solenoid, or a cylindrical magnet magnetised along the axis: a sheet of current around a cylinder.
 
-    The sheet is a stack of loops at Gauss points. That is exact to round-off at a distance of the order of its length, and accurate to
-    about exp(-2 loops d/b) at the distance d from its wall, b the larger of d and half the length; a membrane that comes closer to the wall
-    than length/loops feels single loops.
+    The sheet is a stack of loops (Jackson 1999, section 5.5) at Gauss points. At a distance of the order of its length the field is exact
+    to round-off. At the distance d from the wall its relative error is about exp(-2 loops d/b), with b the larger of d and half the length.
+    A membrane that comes closer to the wall than length/loops feels single loops.
 
     Parameters
     ----------
     strength : float
-        M >= 0 of the dipole with its moment; a magnet with magnetisation m_0 has the moment m_0 pi radius^2 length R0^3.
+        M >= 0: the strength of a dipole with the same moment. A magnet with magnetisation m_0 has the moment m_0 pi radius^2 length R0^3.
     height : float
         Signed height of its middle, in units of R0.
     radius, length : float
         > 0, in units of R0.
     orientation : {1, -1}
+        Sense of the current; matters only beside another source.
     loops : int
         1 to 64; every one costs as much as a :class:`Loop`.
 
@@ -115,7 +126,7 @@ class Solenoid(Source):
         return amplitude * h_rho, amplitude * h_z, 0.0
 
     def distance_squared(self, rho: Any, eta: Any) -> Any:
-        """From the wall between its ends, where the field jumps."""
+        """Squared distance from the wall, where the field jumps."""
         beyond = np.maximum(np.abs(eta - self.height) - self.length / 2, 0.0)
         return (rho - self.radius) ** 2 + beyond**2
 
@@ -127,7 +138,7 @@ class Solenoid(Source):
 
 @dataclass(frozen=True)
 class Wire(Source):
-    """Straight wire on the axis: h_theta = I/(2 pi rho), everything else 0.
+    """Straight wire on the axis: h_theta = I/(2 pi rho), everything else 0 (Biot and Savart; Jackson 1999, section 5.2).
 
     Parameters
     ----------
@@ -203,8 +214,8 @@ def loop_field(a: Any, rho: Any, z: Any) -> tuple[Any, Any]:
 
         h_rho = (4/pi) z k^2 J/(a b^3),     h_z = (4/pi) (a I - rho k^2 J)/(a b^3),     I = Int D^(-3/2),   k^2 J = -Int cos 2x D^(-3/2)
 
-    both by Bulirsch's algorithm (Numer. Math. 13, 1969), with its first step for J done by hand: that takes out the factor k^2, which would
-    else be a difference of nearly equal numbers near the axis and far away.
+    Both come by Bulirsch's algorithm (Numer. Math. 13, 1969). The first step for J is done by hand and takes out the factor k^2: near the
+    axis and far away the algorithm would compute it as a difference of nearly equal numbers.
     """
     square = (a + rho) ** 2 + z**2
     k2 = 4 * a * rho / square

@@ -1,14 +1,14 @@
-"""Principal Cauchy stresses of the membrane, in units of the shear modulus (paper eqs. 46-56).
+"""Principal Cauchy stresses of the membrane, in units of the shear modulus (Saxena et al. 2019, eqs. 46-56).
 
-Mechanical: lambda_i W_i, what the strain energy feels. Total: with the inflating pressure through the thickness and the Maxwell and
-magnetisation stresses, ::
+The mechanical stresses lambda_i W_i are what the strain energy feels. The total stresses contain the inflating pressure through the
+thickness and the stresses of Maxwell and of magnetisation as well::
 
     s_11 = lambda_1 W_1 - P T/R0 + chi (h_t^2 - h_n^2) + (h_t^2 - h_n^2 - h_theta^2)/2
     s_22 = lambda_2 W_2 - P T/R0 + chi (h_theta^2 - h_n^2) + (h_theta^2 - h_t^2 - h_n^2)/2
 
-where (h_t, h_n, h_theta) are the components of the magnetic field of all sources together along the meridian, the normal and around the
-axis: the diagonal of chi (h x h - h_n^2 1) + h x h - |h|^2/2 1, of which the paper has the case h_theta = 0. With h_t h_theta different
-from 0 there is a magnetic shear (chi + 1) h_t h_theta besides, and these two are not principal.
+Here (h_t, h_n, h_theta) are the components of the field of all sources together: along the meridian, along the normal and around the axis.
+The magnetic terms are the diagonal of chi (h x h - h_n^2 1) + h x h - |h|^2/2 1; the paper has the case h_theta = 0. Where h_t h_theta is
+not 0 there is a magnetic shear (chi + 1) h_t h_theta as well, and the two stresses are not principal.
 """
 
 from __future__ import annotations

@@ -5,8 +5,11 @@ middle (0, z_c), in units of its half diagonal, ::
 
     h = grad sum_l c_l Q_l,    Q_0 = 1,  Q_1 = z,  (l + 1) Q_(l+1) = (2 l + 1) z Q_l - l (rho^2 + z^2) Q_(l-1)
 
-which has no divergence, no curl and derivatives of every order, costs a few operations a term whatever the size of the table, and averages
-noise out. The degree is the smallest that meets the tolerance; a table that none meets holds no such field.
+This field has no divergence, no curl and derivatives of every order. It costs a few operations a term whatever the size of the table, and
+it averages noise out. The degree is the smallest that meets the tolerance. A table is refused if no degree meets it: it holds no such
+field.
+
+The recurrence is Bonnet's for Legendre polynomials (NIST Digital Library of Mathematical Functions, 18.9; F. W. J. Olver et al. 2010).
 """
 
 from __future__ import annotations
@@ -39,7 +42,7 @@ class Tabulated(Source):
     rho, z : sequence of float, shapes (n,) and (m,)
         Increasing radii >= 0 and heights in units of R0, three or more of each.
     h_rho, h_z : array_like, shape (n, m)
-        The field at these in units of sqrt(mu/mu0) (times mu0: a flux density in units of sqrt(mu mu0)).
+        The field at these points, in units of sqrt(mu/mu0). A flux density is in units of sqrt(mu mu0).
     strength : float
         Factor >= 0 on |h|^2.
     tolerance : float
@@ -78,7 +81,13 @@ class Tabulated(Source):
 
     @classmethod
     def from_csv(cls, path: str | PathLike[str], **more: Any) -> Self:
-        """Read a text file with a line of names, and four columns rho, z, h_rho, h_z: all points of a grid, in any order.
+        """Read a CSV file: a line of names, and four columns rho, z, h_rho, h_z with all points of a grid, in any order.
+
+        Parameters
+        ----------
+        path : path
+        **more
+            ``strength`` and ``tolerance`` of the source.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """Tension field: the strain energy of a membrane that wrinkles rather than carry compression (Pipkin 1986, Steigmann 1990).
 
-A strip of an isotropic incompressible material in simple tension has the natural width lambda^(-1/2). Where a membrane is narrower than
-that it wrinkles across, at no cost, and its mean energy is that of simple tension; where both stretches are below 1 it is slack. With
+A strip of an isotropic incompressible material in simple tension has the natural width lambda^(-1/2). A membrane narrower than that
+wrinkles across at no cost, and its mean energy is the energy of simple tension. A membrane with both stretches below 1 is slack. With
 Hencky strains, and x+ the positive part of x, all of this is the energy at the *natural strains*::
 
     n_1 = max(e_1, -e_2+/2),   n_2 = max(e_2, -e_1+/2)            W*(e_1, e_2) = W(n_1, n_2)
@@ -11,9 +11,9 @@ Hencky strains, and x+ the positive part of x, all of this is the energy at the 
     meridian wrinkled n_1 = -e_2/2, n_2 = e_2       stress around the axis alone
     slack            n_1 = n_2 = 0                  no energy, no stress
 
-W* is the relaxation (quasiconvex envelope) of W where the Baker-Ericksen inequalities hold; a term of the potential that depends on the
-position alone, like the magnetic one, passes through the relaxation, so this relaxes the whole potential at a given pressure. W* is once
-continuously differentiable; its second derivatives jump across the borders of the zones. Nothing is smoothed.
+W* is the relaxation (quasiconvex envelope) of W where the Baker-Ericksen inequalities hold. A term of the potential that depends on the
+position alone, like the magnetic energy, passes through the relaxation unchanged. So W* relaxes the whole potential at a given pressure. W*
+is once continuously differentiable; its second derivatives jump across the borders of the zones. Nothing is smoothed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .materials import Material
 class TensionField:
     """The relaxed energy W* of a material; itself a :class:`~.materials.Material`.
 
-    In a taut membrane every number is that of the material, to the last bit.
+    In a taut membrane it gives the numbers of the material, to the last bit.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ class TensionField:
 def natural_strains(e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
     """Natural strains (n_1, n_2), and whether the membrane is taut along each direction.
 
-    Written with products of truth values, not with minima and maxima, so that a NaN stays one: a state outside the domain of the
-    energy may not pass for a slack one.
+    It is written with products of truth values, not with minima and maxima, so that a NaN stays a NaN: a state outside the domain of the
+    energy must not pass for a slack state.
     """
     least1, least2 = -0.5 * (e2 > 0) * e2, -0.5 * (e1 > 0) * e1
     taut1, taut2 = e1 >= least1, e2 >= least2

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..physics.materials import Material
     from ..scene import Scene
 
-#: held while expressions are built: CasADi has one mode for all threads that says what a product of symbols is
+#: held while expressions are built: CasADi has one mode, for all threads, of multiplying symbols
 BUILDING = Guard()
 
 
@@ -51,7 +51,9 @@ def point_expressions(
     space: Space,
     forces: tuple[Any, Any] | None,
 ) -> tuple[tuple[ca.SX, ca.SX, ca.SX], dict[str, ca.SX]]:
-    """Symbols (data, local, parameters) and the weighted densities with their gradients at one point; what is no column of data is 0."""
+    """Symbols (data, local, parameters) and the weighted densities with their gradients at one point. Quantities without a column of data
+    are 0.
+    """
     data = ca.SX.sym("data", len(columns))
     local = ca.SX.sym("local", 4)
     parameters = ca.SX.sym("parameters", 2)
@@ -62,8 +64,8 @@ def point_expressions(
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
     material = strain_energy(scene.material, scene.tension_field)
     stress, tangent = response_expressions(material, ca.vertcat(e1, e2))
-    # the chain rule through closed-form stresses keeps the digits that differentiating the energy would lose at small strain, and
-    # written out it takes half the operations of differentiating the composition
+    # the chain rule through closed-form stresses keeps digits that differentiating the energy would lose at small strain; written out, it
+    # takes half the operations
     slopes = ca.jacobian(ca.vertcat(e1, e2), local)
     gradient = area * ca.mtimes(slopes.T, stress)
     bending = sum((stress[k] * ca.jacobian(slopes[k, :].T, local) for k in range(2)), ca.SX(4, 4))

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class FoldDerivatives:
     """Derivatives that a fold followed in a number of the scene needs, for a mode (v, q) of displacement and pressure.
 
-    ``cubic``, ``cubic_pressure`` and ``cubic_number`` are those of the quadratic form v.(E'' - P V'') v - 2 q V'.v with respect to x (shape
-    (n_free,)), P and the number; ``force_number`` is that of E' - P V' with respect to the number, shape (n_free,).
+    ``cubic``, ``cubic_pressure`` and ``cubic_number`` differentiate the quadratic form v.(E'' - P V'') v - 2 q V'.v with respect to x
+    (shape (n_free,)), P and the number. ``force_number`` differentiates E' - P V' with respect to the number, shape (n_free,).
     """
 
     cubic: Array

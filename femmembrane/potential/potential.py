@@ -68,7 +68,7 @@ class Evaluation:
 
     @property
     def force_density(self) -> Array:
-        """What was integrated to the two gradients, shape (8, n_points): for judging a residual."""
+        """The integrands of the two gradients, shape (8, n_points), by which a residual is judged."""
         return self._densities[:N_FORCE]
 
     @property
@@ -153,7 +153,7 @@ class Potential:
 
     @property
     def surrounded(self) -> bool:
-        """Whether anything but the pressure acts on the membrane: without, the flat unloaded state is an equilibrium of no stiffness."""
+        """Whether anything but the pressure acts on the membrane. Otherwise the flat unloaded state is an equilibrium without stiffness."""
         return bool(self.sources or self.loads)
 
     @property
@@ -237,12 +237,12 @@ class Potential:
         u, _, w, _ = self.elements.at_quadrature(np.ascontiguousarray(x)).reshape(4, *space.R.shape)
         rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
         square = [s.distance_squared(rho, eta).min() for s in self.sources]
-        # a source all along the axis runs through hubs, and through a pole nowhere (a scene refuses it)
+        # a source all along the axis may run through hubs; a scene with a pole refuses it
         square += [s.distance_squared(0.0, pole) for s in self.sources if "along" in s.sees for pole in poles]
         return math.sqrt(min(square))
 
     def passed_source(self, before: Array, after: Array) -> bool:
-        """Whether the membrane went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
+        """Whether the membrane went through a source between two states. No branch does, but a step on a coarse mesh may jump across."""
         if not self.sources:
             return False
         heights = zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True)

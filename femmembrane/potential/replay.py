@@ -110,11 +110,11 @@ def vectorise(function: ca.Function, n: int) -> ca.Function:
 
 
 def record_tape(function: ca.Function, operations: Sequence[str]) -> Tape | None:
-    """The instructions of a scalar function for the compiled half; None when one of them is none of its operations.
+    """The instructions of a scalar function for the compiled half; None if it lacks one of the operations.
 
-    Inputs and output are those of :func:`vectorise`. What depends on constants and on the last input alone is a scalar, numbered -1, -2,
-    ... (constants, the last input, results); the rest are registers with a value for each point, numbered 0, 1, ... (inputs, outputs,
-    CasADi's own work space). An instruction is (operation, target, left, right).
+    Inputs and output: see :func:`vectorise`. A quantity that depends on constants and on the last input alone is a scalar. Scalars are
+    numbered -1, -2, ... (constants, the last input, results). All others are registers with a value for each point, numbered 0, 1, ...
+    (inputs, outputs, CasADi's own work space). An instruction is (operation, target, left, right).
 
     Returns
     -------

@@ -17,22 +17,29 @@ from .replay import at_points
 
 @dataclass(frozen=True)
 class StrainEnergy:
-    """A strain energy of one's own; it has no name in scene files.
+    """A strain energy of your own; it has no name in scene files.
 
-    Stress and tangent are the exact derivatives by CasADi. They keep the digits that the function keeps: a difference of numbers of order
-    one leaves round-off of 1e-16 mu in the stress, too coarse for a nearly flat membrane (strains below 1e-8), not for any other.
+    Stress and tangent are the exact derivatives by CasADi. They keep the digits that the function keeps. A function that subtracts numbers
+    of order one leaves round-off of 1e-16 mu in the stress, which is too coarse for a nearly flat membrane alone (strains below 1e-8).
 
     Parameters
     ----------
     function : callable
-        W(lambda_1, lambda_2) of an isotropic incompressible membrane in units of the shear modulus: arithmetic and NumPy's ufuncs, which
-        act on arrays and CasADi symbols alike (``np.where`` does not).
+        W(lambda_1, lambda_2) of an isotropic incompressible membrane, in units of the shear modulus. It may use arithmetic and NumPy's
+        ufuncs, which act on arrays and CasADi symbols alike; ``np.where`` does not.
 
     Raises
     ------
     InputError
-        For a function that does not accept symbols, is not 0 and free of stress at rest, is not symmetric in the two stretches, or whose
-        shear modulus is not 1.
+        For a function that does not accept symbols, is not 0 and free of stress at rest, is not symmetric in the two stretches, or has a
+        shear modulus other than 1.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> own = fm.StrainEnergy(lambda l1, l2: (l1**2 + l2**2 + 1 / (l1 * l2) ** 2 - 3) / 2)  # neo-Hookean
+    >>> print(f"{fm.equilibrium(fm.Scene(material=own, mesh=fm.disc(16)), volume=1.0).pressure:.4f}")
+    1.0669
     """
 
     function: Callable[[Any, Any], Any]

@@ -1,7 +1,7 @@
-"""An unfinished run on disk: ``checkpoint.nc``, from which it is resumed, and whether that is the run that is asked for.
+"""An unfinished run on disk: ``checkpoint.nc``, from which it is resumed, and a check that it belongs to the run.
 
-A checkpoint is a branch file like any other (:mod:`.store`), so that the run can be looked at while it goes on; beside the equilibria it
-holds the memory that predicts the next one.
+A checkpoint is a branch file like any other (:mod:`.store`), so that the run can be looked at while it goes on. It also holds the memory
+that predicts the next equilibrium.
 """
 
 from __future__ import annotations
@@ -52,13 +52,15 @@ class Checkpoints:
         self._analyse(branch)
         clock = time.perf_counter()
         if clock >= self._due:
-            with contextlib.suppress(OSError, InputError):  # room may be found before the end, and hours of work do not stop for this
+            with contextlib.suppress(
+                OSError, InputError
+            ):  # there may be room again before the end: a full disk does not stop hours of work
                 self.save()
             now = time.perf_counter()
             self._due = now + max(PAUSE, (now - clock) / SHARE)
 
     def _analyse(self, branch: Branch) -> None:
-        """Ask the new equilibria what the results will tell of them. They remember it, so that saving takes no longer than writing."""
+        """Compute what the results will say about the new equilibria. They remember it, so that saving takes no longer than writing."""
         names, (held, _) = columns(branch), estimated(branch.scene)
         for equilibrium in branch.equilibria[self._analysed :]:
             for name in names:
@@ -84,7 +86,7 @@ class Checkpoints:
 
 
 def unfinished(folder: Path) -> Branch | None:
-    """The branch from which the run in a folder can go on, None without one; it remarks where it was begun, if that was not here.
+    """The branch from which the run in a folder can go on, or None. If it was begun elsewhere, a remark says where.
 
     Raises
     ------
@@ -106,7 +108,7 @@ def unfinished(folder: Path) -> Branch | None:
 
 
 def same_scene(asked: Scene, kept: Branch, key: str) -> Scene:
-    """The scene of a kept branch, which may have a mesh chosen for the accuracy that is asked for.
+    """The scene of a kept branch; its mesh may have been chosen for the accuracy that is asked for.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Errors against degree and number of elements: their orders, their floor, and values extrapolated to infinitely many elements.
 
-An error is known only as well as what it is measured against. The reference of a study is a fine discretisation whose own error is
-estimated as the distance to other fine ones; errors that do not clear that floor are not resolved, and no order is drawn from them.
+An error is known only as well as what it is measured against. The reference of a study is a fine discretisation, whose own error is
+estimated as the distance to other fine discretisations. Errors that do not clear this floor are not resolved, and no order follows from
+them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: an error counts as resolved from so many times the floor: the reference then spoils it by a tenth at most
+#: an error counts as resolved from this many times the floor: the reference then spoils it by a tenth at most
 RESOLVED = 10.0
 #: round-off of a converged quantity, relative to its size
 ROUND_OFF = 16 * np.finfo(float).eps
@@ -68,17 +69,17 @@ class Convergence:
     element_size : ndarray, shape (elements,)
         Largest element of each mesh, over R0.
     values : mapping of str to ndarray
-        What was found: P, V, pole height, energies (units of mu T R0^2), smallest eigenvalues (units of mu/(rho_m R0^2)), and if asked for
-        the first limit point; NaN where a solve failed or an eigenvalue has no meaning.
+        What was found: P, V, pole height, energies (units of mu T R0^2), smallest eigenvalues (units of mu/(rho_m R0^2)), and the first
+        limit point if it was asked for. NaN where a solve failed or an eigenvalue has no meaning.
     reference : mapping of str to float
         The same on the reference mesh.
     errors : mapping of str to ndarray
-        |value - reference| over ``scale``; for ``profile_l2`` and ``profile_h1`` the norm of the difference of (rho, eta), over that of the
-        reference: Int |d|^2 2 pi R dS, for H1 plus that of dd/dS.
+        |value - reference| over ``scale``. ``profile_l2`` and ``profile_h1`` are norms of the difference d of (rho, eta), over the same
+        norm of the reference. Their squares are Int |d|^2 2 pi R dS, and for H1 Int |dd/dS|^2 2 pi R dS in addition.
     floors : mapping of str to float
         Error of the reference in the same measure: the distance to other fine meshes, at least round-off.
     scale : mapping of str to float
-        Size of the reference, or 1 where that is within its own floor of zero.
+        Size of the reference, or 1 where the reference is zero within its own error.
     meshes : str
         The reference mesh and what its error rests on, in words.
     messages : tuple of str
@@ -106,11 +107,22 @@ class Convergence:
         return tuple(self.errors)
 
     def resolved(self, quantity: str) -> NDArray[np.bool_]:
-        """Which errors stand clear of the floor of the reference."""
+        """Which errors stand clear of the floor of the reference.
+
+        Parameters
+        ----------
+        quantity : str
+            One of :attr:`quantities`.
+        """
         return self._of(self.errors, quantity) > RESOLVED * self.floors[quantity]
 
     def orders(self, quantity: str) -> Array:
         """Observed orders between a mesh and the next coarser one of the list; NaN where an error is not resolved.
+
+        Parameters
+        ----------
+        quantity : str
+            One of :attr:`quantities`.
 
         Raises
         ------
@@ -121,6 +133,11 @@ class Convergence:
 
     def extrapolated(self, quantity: str) -> tuple[Array, Array]:
         """Values for infinitely many elements and their estimated errors, each of shape (degrees,), without use of the reference.
+
+        Parameters
+        ----------
+        quantity : str
+            One of :attr:`quantities`.
 
         Raises
         ------
@@ -152,7 +169,11 @@ class Convergence:
         return pandas.DataFrame(list(self.rows()), columns=list(COLUMNS))
 
     def write_csv(self, path: str | PathLike[str]) -> None:
-        """Write :meth:`rows` under a header line, whole or not at all.
+        """Write :meth:`rows` as a CSV file under a header line, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
 
         Raises
         ------
@@ -164,7 +185,22 @@ class Convergence:
     def plot(
         self, path: str | PathLike[str] | None = None, *, quantities: Sequence[str] | None = None, against: str = "unknowns"
     ) -> Figure:
-        """Errors against unknowns or element size, one line a degree, one panel a quantity; see :mod:`femmembrane.views.convergence`."""
+        """Errors against unknowns or element size, one line a degree, one panel a quantity; a Matplotlib figure.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the figure is also written.
+        quantities : sequence of str, optional
+            Panels to draw. Default: the pressure (or the volume, where the pressure is held), the eigenvalue at a held volume, and the
+            profile in both norms.
+        against : {"unknowns", "element_size"}
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity, or a file that cannot be written.
+        """
         return door.plot_convergence(self, path, quantities=quantities, against=against)
 
     def __str__(self) -> str:
@@ -221,8 +257,8 @@ def observed_orders(errors: Array, elements: Sequence[int]) -> Array:
 def richardson(values: Array, elements: Sequence[int], degree: int) -> tuple[float, float]:
     """The limit of values that converge like (1/n)^q, from the three finest with q fitted to them, and its estimated error.
 
-    The error is the distance to the limit from the three meshes before; three alone cannot confirm their q, and the error is the last
-    change. Where no q between 1/2 and 2 degree + 1/2 fits (round-off, too coarse a mesh), the finest value stands, with the same error.
+    The error is the distance to the limit of the three meshes before. Three meshes alone cannot confirm their q: then the error is the last
+    change. Where no q between 1/2 and 2 degree + 1/2 fits (round-off, too coarse a mesh), the finest value stands, with the last change.
 
     Parameters
     ----------

@@ -32,21 +32,21 @@ class Measurement:
     method : str
         ipopt or newton (finite elements), shooting, collocation, published; the name of the stage or effect.
     start : str
-        warm (a neighbouring state is known) or cold; of an effect, off or on.
+        warm (a neighbouring state is known) or cold; for an effect, off or on.
     degree, elements, unknowns : int or None
         Of the finite elements.
     tolerance : float or None
         Of a method with a tolerance in place of a mesh.
     error : float
-        Relative, against the reference: of the pressure, or under pressure control of the volume. NaN where none is defined.
+        Relative error of the pressure, or under pressure control of the volume, against the reference. NaN where none is defined.
     milliseconds : float
         Median wall time; NaN if nothing came of it.
     setup_milliseconds : float
-        What the first solve on a mesh takes longer than the others: building and, for IPOPT, compiling the problem.
+        Additional time of the first solve on a mesh: building the problem and, for IPOPT, compiling it.
     iterations, evaluations : int or None
         Of the solver, rejected steps included; right-hand sides of the independent methods.
     repeats : int
-        How many times the median is of.
+        How many solves the median is taken over.
     converged : bool
     front : bool
         Whether nothing with the same start is both faster and more accurate.
@@ -91,7 +91,7 @@ class Reference:
     degree: int
 
 
-#: columns of the table, and the machine with every line so that a table can stand alone
+#: columns of the table; every line repeats the machine, so that a table can stand alone
 COLUMNS = (*(f.name for f in fields(Measurement)), "machine")
 
 
@@ -115,7 +115,7 @@ class Cost:
         volume, pressure or center_height.
     load : float
     quantity : str
-        pressure, or under pressure control volume: whose relative error is measured.
+        Its relative error is measured: pressure, or under pressure control volume.
     reference : Reference
         What errors are measured against, and its own error.
     lines : tuple of Measurement
@@ -132,7 +132,12 @@ class Cost:
     machine: Mapping[str, str] = field(repr=False)
 
     def select(self, **having: Any) -> tuple[Measurement, ...]:
-        """The lines with these attributes (``what="solve", method="newton", start="warm"``).
+        """The lines with given attributes, as in ``select(what="solve", method="newton", start="warm")``.
+
+        Parameters
+        ----------
+        **having
+            Attributes of :class:`Measurement` and their values.
 
         Raises
         ------
@@ -146,7 +151,7 @@ class Cost:
 
     @property
     def front(self) -> tuple[Measurement, ...]:
-        """The solves that no other one with the same start beats in both time and error, warm ones first, the fastest first."""
+        """The solves that no other solve with the same start beats in both time and error: warm ones first, and the fastest first."""
         return tuple(sorted((line for line in self.lines if line.front), key=lambda line: (STARTS.index(line.start), line.milliseconds)))
 
     def __str__(self) -> str:
@@ -159,7 +164,11 @@ class Cost:
         return pandas.DataFrame(list(self._rows()), columns=list(COLUMNS))
 
     def write_csv(self, path: str | PathLike[str]) -> None:
-        """Write all lines under a header, whole or not at all; what does not apply is left empty.
+        """Write all lines as a CSV file under a header, whole or not at all; what does not apply is left empty.
+
+        Parameters
+        ----------
+        path : path
 
         Raises
         ------
@@ -169,7 +178,13 @@ class Cost:
         files.write_csv(path, COLUMNS, ([None if _absent(value) else value for value in row] for row in self._rows()))
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Error against milliseconds as a Matplotlib figure, also written to ``path`` if given."""
+        """Error against milliseconds as a Matplotlib figure.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the figure is also written.
+        """
         return door.plot_cost(self, path)
 
     def _rows(self) -> Iterator[list[Any]]:

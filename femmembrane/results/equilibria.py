@@ -15,12 +15,14 @@ class Equilibria(Sequence[Equilibrium]):
     Attributes
     ----------
     control : {"volume", "pressure"}
+        What is held.
     load : float
+        Its value.
     found : tuple of Equilibrium
     energies : tuple of float
-        The energy that orders them.
+        The energy of each, which orders them.
     searched : str
-        What was done to find them: a search never proves that there are no more.
+        What was done to find them. A search never proves that there are no more.
     """
 
     control: str

@@ -19,9 +19,9 @@ class Deviation:
     value : float
         As computed.
     error : float
-        Signed: value minus the number of the finer space; 0 for what is held, NaN where there is no estimate.
+        Signed: the value minus the number on the finer space. It is 0 for what is held, and NaN where there is no estimate.
     scale : float
-        What the relative error is relative to.
+        Divisor of the relative error.
     """
 
     value: float
@@ -35,7 +35,7 @@ class Deviation:
 
     @property
     def relative(self) -> float:
-        """Size of the error over the scale: that of the value, for the total energy the sum of the sizes of its two parts."""
+        """Size of the error over the scale: over the size of the value, or for the total energy over the sizes of its parts together."""
         if self.error == 0 or np.isnan(self.error):
             return self.error + 0.0
         return abs(self.error) / self.scale if self.scale else np.inf
@@ -79,7 +79,7 @@ class ErrorEstimate:
         return "\n".join(lines + ([self.reason] if self.reason else []))
 
 
-#: what an estimate is about, in its order
+#: the quantities of an estimate, in its order
 ESTIMATED = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
 
 

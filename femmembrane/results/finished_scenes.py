@@ -1,7 +1,7 @@
 """Finished scenes of a sweep on disk: one SQLite file, in which a scene is whole or not at all.
 
-The file is open to one process at a time. A process that is killed loses no scene that it had put there. Each row carries a digest of
-itself and its key, so that one whose bytes have changed counts as none.
+The file is open to one process at a time. A killed process loses no scene that it had stored. Each row carries a digest of itself and its
+key; a row whose bytes have changed does not count.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class FinishedScenes:
             self._file.execute("PRAGMA user_version = 1")  # writes, and so takes the lock
             found = self._file.execute("PRAGMA quick_check(1)").fetchall()
             self._file.execute("SELECT key, row FROM scene LIMIT 1").fetchall()
-        except (sqlite3.Error, ValueError) as error:  # ValueError: what should be text is none
+        except (sqlite3.Error, ValueError) as error:  # ValueError: something that should be text is not
             found = [(error,)]
         if found != [("ok",)]:
             self._file.close()
@@ -71,7 +71,7 @@ class FinishedScenes:
         self._file.close()
 
     def get(self, key: str) -> dict[str, Any] | None:
-        """The value of a key; None without one, and for one that is not what was put there."""
+        """The value of a key; None without a value, and for a value that has changed since it was stored."""
         try:
             found = self._file.execute("SELECT row FROM scene WHERE key = ?", (key,)).fetchone()
             digest, text = found[0].split(" ", 1) if found else ("", "")

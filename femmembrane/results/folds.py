@@ -22,15 +22,17 @@ FOLD_NAMES = {"limit_point": "limit point (dP = 0)", "volume_fold": "volume fold
 
 @dataclass(frozen=True, eq=False)
 class Cusp(SpecialPoint):
-    """A point of a fold curve where the number is stationary along the curve, solved as an equation.
+    """A point of a fold curve where the number of the scene is stationary along the curve; it is solved as an equation.
+
+    It has the attributes of a :class:`SpecialPoint`, and one more.
 
     Attributes
     ----------
     kind : str
-        ``cusp``: two folds of the kind followed merge; on one side of ``value`` there are both, on the other none. ``branch_point``: a
+        ``cusp``: two folds of the kind followed merge. Both exist on one side of ``value``, and none on the other. ``branch_point``: a
         limit point meets a volume fold, and branches of equilibria meet or separate.
     value : float
-        The number there; its error is of second order in ``error``.
+        The number of the scene there; its error is of second order in ``error``.
     """
 
     value: float = field(kw_only=True)
@@ -47,15 +49,17 @@ class FoldCurve:
     parameter : str
         Name of the number, as given.
     values, pressure, volume, center_height : ndarray, shape (len(curve),)
-        The number, and the fold at it, in the order of the curve.
+        The number, and the fold at this number, in the order of the curve.
     cusps : tuple of Cusp
-        Where the curve turns in the number.
+        Points where the curve turns back in the number.
     equilibria : tuple of Equilibrium
         The folds as equilibria, each of its own scene.
     closed : bool
         Whether the curve came back to its first point, which is then also the last.
     status : Status
-        How the curve ended; with a ``message`` unless a bound was met or the curve closed.
+        How the curve ended.
+    message : str
+        Why it ended; empty when a bound was met or the curve closed.
     timings : mapping of str to float
         Seconds by stage.
     """
@@ -94,5 +98,11 @@ class FoldCurve:
         )
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Pressure and volume of the fold against the number as a Matplotlib figure, also written to ``path`` if given."""
+        """Pressure and volume of the fold against the number as a Matplotlib figure.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the figure is also written.
+        """
         return door.plot_fold_curve(self, path)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray
 
 _PLACES = {"volume": "enclosed volume V/R0^3", "pressure": "pressure P = p R0/(mu T)", "center_height": "height of the pole over R0"}
-#: dimension along which a scene has several values, and what it counts
+#: dimensions along which a scene has several values, and what each counts
 _FAMILIES = {
     "": ("step", "equilibrium", "along the branch"),
     "limit_": ("limit_point", "limit point", "of the limit points along the branch (dP = 0)"),
@@ -119,7 +119,7 @@ def load_dataset(path: str | PathLike[str]) -> xarray.Dataset:
         words = all(isinstance(dataset.attrs[name], str) for name in ("quantity", "scene"))
         whole = all(dataset[name].shape == shape for name in ("status", "message", "has_result", "seconds"))
         whole = whole and dataset["has_result"].dtype == bool
-    except Exception as error:  # there is nothing that a file nobody wrote in this way could not lead to
+    except Exception as error:  # a file that was not written here can raise anything
         raise InputError("path", str(path), f"{what} is needed ({reason(error)})") from None
     if not (len(shape) == len(keys) > 0 and words and whole):
         raise InputError("path", str(path), f"{what} is needed")

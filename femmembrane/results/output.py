@@ -25,12 +25,12 @@ from .table import write_csv, write_special_points_csv, write_zones_csv
 if TYPE_CHECKING:
     from .records import Branch
 
-#: the record of a run, which makes its folder complete, and all files of one, in the order in which they are listed
+#: the record of a run, which makes its folder complete, and all files of a run, in the order in which they are listed
 RECORD = "run.json"
 RUN_FILES = (
     *("branch.csv", "special_points.csv", "zones.csv", RECORD),
     *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
-    "report.html",  # written from the rest, by whom it is asked for
+    "report.html",  # written from the other files, when it is asked for
 )
 #: the folder of the surfaces of a run
 SURFACES_FOLDER = "membrane"
@@ -107,9 +107,11 @@ def read_record(folder: Path) -> dict[str, Any] | None:
 
 
 def _check_record(facts: dict[str, Any]) -> None:
-    """Raise ValueError (or what a value of another type leads to) for what is no record or was changed; old ones have no digest."""
+    """Raise ValueError, or another error for values of a wrong type, unless this is a record that nobody changed. Old records have no
+    digest.
+    """
     digest = facts.pop("digest", None)
-    # the name of the digest may be what was damaged
+    # the name of the digest itself may be damaged
     if digest != _digest(facts) if digest is not None else not facts.keys() <= _FACTS:
         raise ValueError("it was damaged or changed after it was written")
     Status(facts["status"])
@@ -139,7 +141,7 @@ _FACTS = {
     *("scene", "command", "mesh", "notes", "status", "message", "equilibria", "special_points", "timings", "compiled"),
     *("versions", "platform", "processors", "written"),
 }
-#: what holds most in the least room first; the record makes the folder complete
+#: the file that holds most in the least room comes first; the record comes last, and makes the folder complete
 _WRITTEN = ("branch.nc", *(name for name in RUN_FILES if name not in ("branch.nc", RECORD)), RECORD)
 
 
@@ -180,7 +182,7 @@ def _writable(folder: Path) -> Path:
 
 
 def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any]:
-    """What was asked, what it ran on, and how it went."""
+    """The record of a run: what was asked, on which machine, and how it ended."""
     return {
         "scene": branch.scene.to_dict(),
         "command": command if command is None or isinstance(command, str) else list(command),

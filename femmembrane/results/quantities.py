@@ -99,9 +99,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "zone_area_fraction": Quantity("part of the reference area in the zone"),
     "zone_deformed_area_fraction": Quantity("part of the deformed area in the zone"),
 }
-#: the quantities that tell where on a branch an equilibrium lies
+#: the quantities that locate an equilibrium on a branch
 PLACES = ("volume", "pressure", "center_height")
-#: of the quantities of a verdict, whose names go on with a control or the number of waves
+#: beginnings of the names of the quantities of a verdict, which go on with a control or the number of waves
 _OF_VERDICTS: Mapping[str, type[int] | type[str]] = {"verdict": str, "reason": str, "negative": int}
 
 

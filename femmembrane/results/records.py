@@ -33,7 +33,7 @@ _SHOWN = ("pressure", "volume")
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """One equilibrium of a scene.
+    """One equilibrium of a scene, as :func:`femmembrane.equilibrium` and the items of a :class:`Branch` are.
 
     Attributes
     ----------
@@ -42,11 +42,11 @@ class Equilibrium:
     volume : float
         Enclosed volume over R0^3, signed, with the 2 pi.
     center_height : float
-        Height of the pole over R0; of a shape without one that of the first point of its meridian.
+        Height of the pole over R0. A shape without a pole gives the height of the first point of its meridian.
     elastic_energy, magnetic_energy : float
         In units of mu T R0^2, with the 2 pi; the magnetic one is 0 without sources.
     residual : float
-        Largest out-of-balance force relative to the forces that meet at a node, recomputed after the solve.
+        Largest out-of-balance force at a node, relative to the forces that meet there; recomputed after the solve.
     iterations : int
         Iterations spent on this equilibrium, rejected attempts included.
     status : Status
@@ -58,7 +58,17 @@ class Equilibrium:
     gas : Gas or None
         The enclosed gas that holds it, when found under gas control.
     load_energy : float
-        Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without.
+        Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without loads.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> eq = fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volume=1.0)
+    >>> print(f"P = {eq.pressure:.4f}, pole at {eq.center_height:.4f}, {eq.verdict('pressure').word} at a held pressure")
+    P = 1.0669, pole at 0.5528, stable at a held pressure
+    >>> shape = eq.profile([0.0, 0.5])
+    >>> [round(float(eta), 4) for eta in shape["eta"]], [round(float(stretch), 4) for stretch in shape["stretch_1"]]
+    ([0.5528, 0.4115], [1.2186, 1.202])
     """
 
     pressure: float
@@ -85,13 +95,18 @@ class Equilibrium:
 
     @property
     def potential(self) -> Potential:
-        """The discrete potential this state lives in (built once per scene)."""
+        """The discrete potential of the scene; it is built once."""
         from ..potential import potential_of
 
         return potential_of(self.scene)
 
     def in_scene(self, scene: Scene) -> Equilibrium:
-        """The same equilibrium in a scene with the same potential, which may ask for or scale other things."""
+        """The same equilibrium in a scene with the same potential, which may have other scales and other analyses.
+
+        Parameters
+        ----------
+        scene : Scene
+        """
         return replace(self, scene=scene, _zones={})
 
     def profile(self, r: ArrayLike | None = None) -> dict[str, Array]:
@@ -100,15 +115,15 @@ class Equilibrium:
         Parameters
         ----------
         r : array_like, optional
-            Reference radii in [0, 1]; of a meridian that does not run along the radius, arc lengths over R0 from its first end. Default
-            the nodes, from the pole to the rim (from the first to the last end).
+            Reference radii in [0, 1]. For a meridian that does not run along the radius: arc lengths over R0 from its first end. Default:
+            the nodes, from the first end (the pole) to the last (the rim).
 
         Returns
         -------
         dict of ndarray
-            r, rho, eta (over R0; also s, the arc length, where it is not r); stretch_1, stretch_2 (1 meridional, 2 circumferential);
-            mechanical_stress_1, mechanical_stress_2, total_stress_1, total_stress_2 (Cauchy, in units of mu); when the scene has scales,
-            the stresses in Pa as well, under the same names with ``_pa`` at the end.
+            r, rho, eta over R0, and s, the arc length, where it is not r; stretch_1 (meridional) and stretch_2 (circumferential); the
+            Cauchy stresses mechanical_stress_1, mechanical_stress_2, total_stress_1 and total_stress_2, in units of mu. A scene with scales
+            has the stresses in Pa as well, under the same names with ``_pa`` at the end.
 
         Raises
         ------
@@ -125,16 +140,16 @@ class Equilibrium:
         Parameters
         ----------
         control : {"pressure", "volume", "gas"}
-            What is held against axisymmetric perturbations; left out for azimuthal ones, which do not change the volume.
+            What is held against axisymmetric perturbations. Left out for azimuthal perturbations, which do not change the volume.
         azimuthal : int
             Number of waves around the axis; 0 for axisymmetric perturbations.
         gas : Gas, optional
-            For control "gas": the enclosed gas; default the one under which this equilibrium was found.
+            For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found.
 
         Raises
         ------
         InputError
-            For an unknown control, or one that does not go with the rest.
+            For an unknown control, or for arguments that do not go together.
         """
         if not isinstance(control, str | None) or not isinstance(azimuthal, (int, np.integer)):
             raise InputError(
@@ -166,7 +181,7 @@ class Equilibrium:
         count : int
             How many modes.
         control : {"pressure", "volume"}
-            What is held during the motion; makes a difference for axisymmetric modes only.
+            What is held during the motion. It makes a difference for axisymmetric modes only.
 
         Raises
         ------
@@ -185,7 +200,7 @@ class Equilibrium:
         Parameters
         ----------
         criterion : {"total", "mechanical"}, optional
-            The stresses that decide; default what the scene asks for in ``analysis.wrinkling``, or "total".
+            The stresses that decide. Default: ``analysis.wrinkling`` of the scene, or "total".
 
         Raises
         ------
@@ -201,13 +216,13 @@ class Equilibrium:
     def error_estimate(self, control: str = "volume") -> ErrorEstimate:
         """Estimated discretisation errors, from the same load in a finer space; computed once and remembered.
 
-        Where there is none (a compressed or slack state, one too close to a fold of what is held, a mesh too coarse) errors are NaN, and
-        the record says why. In a wrinkled tension field the estimate is rough, a factor of two or so.
+        Some states have no estimate: compressed and slack ones, states too close to a fold in what is held, states on a mesh too coarse.
+        Their errors are NaN, and the record says why. In a wrinkled tension field the estimate is rough, a factor of two or so.
 
         Parameters
         ----------
         control : {"volume", "pressure", "center_height"}
-            What is held: the errors are those of the other quantities at the same volume, pressure or pole height.
+            What is held. The other quantities are compared at the same volume, pressure or pole height.
 
         Raises
         ------
@@ -234,13 +249,14 @@ class SpecialPoint:
     kind : str
         limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset.
     volume, pressure, center_height : float
+        Of its equilibrium.
     error : float
-        Estimated distance, relative, of the located point from the exact one of the discrete branch.
+        Estimated relative distance of the located point from the exact point of the discrete branch.
     equilibrium : Equilibrium
     azimuthal : int
         For an azimuthal onset: the number of waves against which stability is lost or regained there.
     tangent : ndarray, shape (n_free + 1,), or None
-        For a branch point: the direction in (x, P) of the branch on which it was found, which tells it from the one that crosses there.
+        For a branch point: the direction in (x, P) of the branch on which it was found. It tells this branch from the crossing one.
     """
 
     kind: str
@@ -255,7 +271,7 @@ class SpecialPoint:
 
 @dataclass(frozen=True, eq=False)
 class PathMemory:
-    """What the next equilibrium of a run depends on besides the last one, so that an interrupted run goes on as if it had not been.
+    """What the next equilibrium of a run depends on besides the last one. With it an interrupted run goes on as if it had not stopped.
 
     Attributes
     ----------
@@ -298,8 +314,8 @@ class Jump:
     index : int
         Position in the branch of the equilibrium landed on.
     limit : SpecialPoint or None
-        The fold at which the branch turned back before the load, or the branch point at which it lost its stability: from there another
-        branch leads to the landing.
+        The fold at which the branch turned back before the load, or the branch point at which it lost its stability. From a branch point
+        another branch leads to the landing.
     landing : Equilibrium
     """
 
@@ -309,7 +325,8 @@ class Jump:
 
 
 class SoFar(Sequence[Equilibrium]):
-    """The equilibria that a growing list has now: taken after each step of a run, a copy would cost a time quadratic in the steps."""
+    """The equilibria that a growing list has now. It is taken after each step of a run, where copies would cost a time quadratic in the
+    steps."""
 
     def __init__(self, growing: list[Equilibrium]) -> None:
         self._growing, self._count = growing, len(growing)
@@ -330,24 +347,37 @@ class SoFar(Sequence[Equilibrium]):
 
 @dataclass(frozen=True, eq=False)
 class Branch(Sequence[Equilibrium]):
-    """Equilibria in the order in which they were found.
+    """Equilibria in the order in which they were found. A branch is a sequence: it has a length, items and slices.
 
     Attributes
     ----------
     scene : Scene
     equilibria : sequence of Equilibrium
     status : Status
-        How the run ended; with a ``message`` unless all went well.
+        How the run ended.
+    message : str
+        Why it ended before it was finished; empty when all went well.
     timings : mapping of str to float
         Seconds by stage.
-    special_points : tuple of SpecialPoint, or None when none were looked for
-    memory : TraceMemory for a branch traced by arc length, PathMemory for an unfinished run by loads, else None
+    special_points : tuple of SpecialPoint, or None
+        None when special points were not looked for.
+    memory : TraceMemory, PathMemory or None
+        What is needed to go on: a TraceMemory for a branch traced by arc length, a PathMemory for an unfinished run by loads.
     jumps : tuple of Jump
         Where a run snapped because the branch turned back before a load, or lost its stability at a branch point.
     solver : str
-        Who found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
+        Which solver found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     remarks : tuple of str
-        What is to be known of how the run went on, such as that another processor began it.
+        Remarks on how the run went on, for instance that another processor began it.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volumes=[0.5, 1.0, 2.0])
+    >>> len(branch), branch.status.value, round(branch[-1].pressure, 4)
+    (3, 'converged', 1.8025)
+    >>> [round(float(height), 4) for height in branch.column("center_height")]
+    [0.298, 0.5528, 0.94]
     """
 
     scene: Scene
@@ -384,9 +414,9 @@ class Branch(Sequence[Equilibrium]):
         Parameters
         ----------
         name : str
-            step, any column of the table, status, an energy, lambda_ or verdict_ with pressure, volume, n1, n2, ..., fraction_ with a kind
-            of zones, when the scene has scales, pressure_pa, and when it asks for error estimates, error_ with what they are of (relative
-            errors at the load that its [run] prescribes, else at the volume).
+            ``step``, ``status``, any column of the table or an energy. ``lambda_`` or ``verdict_`` is followed by pressure, volume, n1, n2,
+            ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for error estimates (relative errors at
+            the load that its [run] prescribes, else at the volume). A scene with scales has ``pressure_pa`` as well.
 
         Raises
         ------
@@ -421,8 +451,7 @@ class Branch(Sequence[Equilibrium]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The remarks, what was repaired of the points of the mesh, and what was done about motions of the membrane as a whole that nothing
-        resists."""
+        """The remarks, what was repaired in the points of the mesh, and what was done about motions of the whole that nothing resists."""
         from ..discretization.space import space_of_scene
 
         repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
@@ -445,21 +474,43 @@ class Branch(Sequence[Equilibrium]):
         return to_xarray(self)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything to one NetCDF file; :func:`femmembrane.load` reads it back."""
+        """Write everything to one NetCDF file; :func:`femmembrane.load` reads it back.
+
+        Parameters
+        ----------
+        path : path
+        """
         from .store import save
 
         save(self, path)
 
     def to_vtk(self, path: str | PathLike[str]) -> None:
-        """Write a ParaView collection (.pvd) with one VTU file a step."""
+        """Write a ParaView collection (.pvd) with one VTU file a step.
+
+        Parameters
+        ----------
+        path : path
+            With the suffix ``.pvd``.
+        """
         door.write_vtk(self, path)
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Pressure against volume as a Matplotlib figure, also written to ``path`` if given."""
+        """Pressure against volume as a Matplotlib figure.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the figure is also written.
+        """
         return door.plot_pressure_volume(self, path)
 
     def report(self, path: str | PathLike[str]) -> None:
-        """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings."""
+        """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings.
+
+        Parameters
+        ----------
+        path : path
+        """
         door.write_report(self, path)
 
     def cite(self) -> str:
@@ -475,7 +526,7 @@ class Branch(Sequence[Equilibrium]):
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:
     s = np.atleast_1d(np.asarray(r, dtype=float))
-    margin = LEAST_LENGTH * float(ends[-1])  # whoever computes an end meets it to round-off only
+    margin = LEAST_LENGTH * float(ends[-1])  # a computed end is exact to round-off only
     if not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
         raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
     return np.clip(s, ends[0], ends[-1])

@@ -111,10 +111,32 @@ def write_dataset(dataset: xarray.Dataset, path: str | PathLike[str], encoding: 
 def load(path: str | PathLike[str]) -> Branch:
     """Bring a saved branch back, without solving anything.
 
+    Parameters
+    ----------
+    path : path
+        A file that :meth:`Branch.save` or a run wrote.
+
+    Returns
+    -------
+    Branch
+        Equal to the saved one to the last bit.
+
     Raises
     ------
     InputError
-        When the file cannot be read, is not one of ours, or has a newer format.
+        When the file cannot be read, was not written by this package, or has a newer format.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import femmembrane as fm
+    >>> branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volumes=[0.5, 1.0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     branch.save(Path(folder) / "branch.nc")
+    ...     again = fm.load(Path(folder) / "branch.nc")
+    >>> bool((again.column("pressure") == branch.column("pressure")).all())
+    True
     """
     return branch_of(read_branch_file(path), path)
 

@@ -29,10 +29,11 @@ class Sweep:
     Attributes
     ----------
     scene : Scene
-        The one whose keys were changed.
+        The scene whose keys were changed.
     over : mapping of str to tuple
         The values of each key.
     quantity : str
+        What was computed of every scene.
     """
 
     scene: Scene
@@ -59,12 +60,21 @@ class Sweep:
         return self._dataset.copy()
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the data set to a NetCDF file, whole or not at all."""
+        """Write the data set to a NetCDF file, whole or not at all; :meth:`load` reads it back.
+
+        Parameters
+        ----------
+        path : path
+        """
         save_dataset(self._dataset, path)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Sweep:
         """Bring a saved sweep back.
+
+        Parameters
+        ----------
+        path : path
 
         Raises
         ------
@@ -80,13 +90,15 @@ class Sweep:
         return cls(scene, over, dataset.attrs["quantity"], dataset)
 
     def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None) -> Any:
-        """Maps over two keys, or curves over one, as a Matplotlib figure, also written to ``path`` if given.
+        """Maps over two keys, or curves over one, as a Matplotlib figure.
 
         Parameters
         ----------
+        path : path, optional
+            Where the figure is also written.
         show : sequence of str, optional
-            Variables of the data set; one with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
-            most telling ones of the quantity.
+            Variables of the data set. A variable with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
+            most telling variables of the quantity.
 
         Raises
         ------
@@ -103,7 +115,7 @@ class Plan:
     Attributes
     ----------
     scenes, kept : int
-        Different scenes of the grid, and those of them that are finished already.
+        Number of different scenes of the grid, and how many of them are finished already.
     seconds_each : float
         Mean wall time of the scenes that were timed; 0 if none is left.
     timed, workers : int

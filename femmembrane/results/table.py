@@ -53,7 +53,7 @@ def columns(branch: Branch) -> list[str]:
 def estimated(scene: Scene) -> tuple[str, tuple[str, ...]]:
     """What is held while errors are estimated, and the quantities whose relative errors are columns; none unless asked for.
 
-    Held is what the scene's [run] prescribes; the volume with arc length and without a run.
+    The quantity that the scene's [run] prescribes is held; with arc length and without a run, the volume.
     """
     run = scene.run
     control = (run.quantity if run is not None else None) or "volume"
@@ -84,7 +84,7 @@ def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume"
 
 
 def known_columns(branch: Branch) -> list[str]:
-    """What :meth:`Branch.column` may be asked for: :func:`columns`, and what costs a look at the equilibria only when it is asked for.
+    """Names that :meth:`Branch.column` knows: :func:`columns`, and columns that are computed only when they are asked for.
 
     Verdicts against azimuthal perturbations of any number of waves are left out of the list.
     """

@@ -25,21 +25,24 @@ class Verdict:
     Attributes
     ----------
     stable : bool or None
-        None when the smallest eigenvalue is zero within its error, be it a marginal state or one whose sign the mesh does not resolve, or
-        (with NaN) could not be proved to be the smallest, or when a compression that the mesh shows was not confirmed on finer elements.
+        None where the verdict is open. The smallest eigenvalue may be zero within its error: the state is marginal, or the mesh does not
+        resolve the sign. It may be NaN, since it could not be proved to be the smallest. Or the mesh shows a compression that finer
+        elements did not confirm.
     smallest_eigenvalue : float
         lambda of K phi = lambda M phi, a squared natural frequency in units of mu/(rho_m R0^2); NaN where no eigenvalue has a meaning.
     error : float
-        Of the eigenvalue: a bound on the algebraic error. Where the discretisation error could change the sign, that is where the mesh does
-        not clearly resolve the mode and its state or the eigenvalue is small, three times the discretisation error as well, estimated on
-        elements of one degree more. Where finer elements settle a sign that the scene's own mesh leaves open, value and error are theirs.
+        Of the eigenvalue: a bound on the algebraic error. The error of the mesh is added where it could change the sign: where the
+        eigenvalue is small, or the mesh does not clearly resolve the mode and its state. It counts three times, estimated on elements of
+        one degree more. Where finer elements settle a sign that the scene's own mesh leaves open, value and error come from the finer
+        elements.
     control : str or None
-        "pressure", "volume" or "gas"; None for azimuthal perturbations, where both agree.
+        "pressure", "volume" or "gas"; None for azimuthal perturbations, for which it makes no difference.
     azimuthal : int
         Number of waves around the axis; 0 for axisymmetric perturbations.
     negative_directions : int or None
         Number of negative eigenvalues, by inertia.
     reason : str
+        What the verdict rests on, in words.
     coefficients : ndarray or None
         Coefficients of the mode on the free degrees of freedom, normalised in the mass of the reference area.
     """
@@ -59,7 +62,7 @@ class Verdict:
     def mode(self) -> Mapping[str, Array] | None:
         """The shape of the perturbation at the nodes: r (reference radius), u, w, and c around the axis for azimuthal ones.
 
-        Of a membrane that nothing holds it is known up to a motion of the whole.
+        For a membrane that nothing holds, the shape is known up to a motion of the whole.
         """
         return None if self._shape is None or self.coefficients is None else self._shape(self.coefficients)
 

@@ -26,7 +26,7 @@ class Vibration:
     control : str or None
         "pressure" or "volume", what is held during the motion; None for azimuthal modes, which do not change the volume.
     coefficients : ndarray
-        Of the mode on the free degrees of freedom, normalised in the mass of the reference area, the largest one positive.
+        Coefficients of the mode on the free degrees of freedom, normalised in the mass of the reference area. The largest is positive.
     """
 
     eigenvalue: float
@@ -38,12 +38,12 @@ class Vibration:
 
     @property
     def omega(self) -> float:
-        """Angular frequency in units of sqrt(mu/(rho_m R0^2)), the imaginary part of s: 0 in an unstable direction, which departs."""
+        """Angular frequency in units of sqrt(mu/(rho_m R0^2)); 0 in an unstable direction, in which the membrane departs."""
         return float(np.sqrt(max(self.eigenvalue, 0.0)))
 
     @property
     def growth_rate(self) -> float:
-        """Rate of departure in the units of omega, the real part of s: 0 where the membrane oscillates."""
+        """Rate of departure in the units of omega; 0 where the membrane oscillates."""
         return float(np.sqrt(max(-self.eigenvalue, 0.0)))
 
     @property

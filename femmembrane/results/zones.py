@@ -14,23 +14,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import choice
 
-#: kinds of zones; the place of each is its number, the sum of _BITS of what is compressive
+#: kinds of zones; the place of a kind is its number
 KINDS = ("taut", "radial", "circumferential", "double")
 
 
 @dataclass(frozen=True)
 class Zone:
-    """A part of the membrane between two circles with the same signs of the principal stresses.
+    """A part of the membrane between two circles, throughout which the principal stresses keep their signs.
 
     Attributes
     ----------
     kind : {"taut", "radial", "circumferential", "double"}
+        The directions in which the stress is compressive.
     r, rho : (float, float)
         Reference and deformed radii over R0 at its start and end, seen from the pole.
     area_fraction, deformed_area_fraction : float
-        Its part of the reference and of the deformed area.
+        Its share of the reference area and of the deformed area.
     s : (float, float)
-        Parameters of the meridian at its start and end; those of a disc are the reference radii.
+        Parameters of the meridian at its start and end; for a disc, the reference radii.
     """
 
     kind: str
@@ -87,7 +88,11 @@ class Zones(Sequence[Zone]):
         return tuple(zone.r[1] for zone in self.zones[:-1])
 
     def fraction(self, kind: str) -> float:
-        """Part of the reference area that is of a kind.
+        """Share of the reference area that is of a kind.
+
+        Parameters
+        ----------
+        kind : {"taut", "radial", "circumferential", "double"}
 
         Raises
         ------
@@ -98,7 +103,13 @@ class Zones(Sequence[Zone]):
         return float(sum(zone.area_fraction for zone in self if zone.kind == kind))
 
     def numbers(self, s: ArrayLike) -> NDArray[np.int64]:
-        """Kinds at parameters s of the meridian, as their places in KINDS (0 taut ... 3 double); a border is of the zone outside it."""
+        """Kinds at points of the meridian as numbers, from 0 (taut) to 3 (double). A border belongs to the zone outside it.
+
+        Parameters
+        ----------
+        s : array_like
+            Parameters of the meridian; for a disc, reference radii.
+        """
         kinds = np.array([KINDS.index(kind) for kind in self.kinds])
         return kinds[np.searchsorted([zone.s[1] for zone in self.zones[:-1]], s, side="right")]
 
@@ -119,7 +130,7 @@ class ZonesAlong:
     Attributes
     ----------
     steps : ndarray
-        Place of each state along the branch: whole numbers are its equilibria, the others lie on straight lines between two of them.
+        Place of each state along the branch. Whole numbers are equilibria; states between lie on a straight line from one to the next.
     zones : tuple of Zones
     snaps : frozenset of int
         Positions in ``steps`` of the equilibria that the membrane snapped to.

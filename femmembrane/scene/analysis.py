@@ -10,7 +10,7 @@ from ..errors import InputError
 
 VERDICTS = ("pressure", "volume")
 WRINKLING = ("total", "mechanical")
-#: waves around the axis; a thousand times finer than a mesh resolves
+#: largest number of waves around the axis, a thousand times more than a mesh resolves
 MAX_WAVES = 10**6
 
 

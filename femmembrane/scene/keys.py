@@ -12,14 +12,14 @@ import numpy as np
 from ..checks import LARGEST
 from ..errors import InputError
 
-#: scenes of a sweep: each is checked and has a key before the first is computed
+#: most scenes of a sweep: each is checked and has a key before the first is computed
 MAX_SCENES = 10**5
 #: names in a key
 _DEPTH = 20
 
 
 def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """The tables of a scene with one value changed or added; what was given stays as it is.
+    """The tables of a scene with one value changed or added; the given tables do not change.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def set_key(tables: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
 
 
 def values_of(option: str, text: str) -> tuple[str, tuple[Any, ...]]:
-    """A key and its values from KEY=START:STOP:COUNT or KEY=V1,V2,...; what is no TOML value is a text.
+    """A key and its values from KEY=START:STOP:COUNT or KEY=V1,V2,... A value that is no TOML counts as a text.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def values_of(option: str, text: str) -> tuple[str, tuple[Any, ...]]:
 
 
 def set_all(option: str, tables: Mapping[str, Any], texts: Iterable[str]) -> dict[str, Any]:
-    """The tables of a scene with values changed or added by texts KEY=VALUE, one after the other; what is no TOML value is a text.
+    """The tables of a scene with values changed or added by texts KEY=VALUE, one after the other. A value that is no TOML counts as a text.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def _value(word: str) -> Any:
 
 
 def _index(place: Any, key: str, depth: int) -> int:
-    """The place in a list that a part of a key means."""
+    """The place in a list that a part of a key stands for."""
     names = key.split(".")
     owner, name = ".".join(names[:depth]) or "the scene", names[depth]
     if not isinstance(place, list):

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ..checks import choice, number, sequence, sign, store, whole
 from ..errors import InputError
 
-#: words of [run].control and the quantity that each prescribes, by its public name; arc length prescribes none
+#: words of [run].control, and the public name of the quantity that each prescribes; arc length prescribes none
 PRESCRIBED = {"volume": "volume", "pressure": "pressure", "height": "center_height"}
 CONTROLS = (*PRESCRIBED, "arc-length")
-#: quantities that a minimiser can hold; the height of the pole is held by no potential
+#: quantities that a minimiser can hold; no potential holds the height of the pole
 MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
@@ -59,7 +59,7 @@ class Run:
     control : {"volume", "pressure", "height", "arc-length"}
         What is prescribed at each equilibrium.
     start, stop : float, optional
-        First and last load; with arc length, ``start`` is the volume of the first equilibrium and ``stop`` is not used.
+        First and last load. With arc length ``start`` is the volume of the first equilibrium, and ``stop`` is not used.
     steps : int, optional
         Number of equilibria from start to stop, both included (one: start alone).
     values : sequence of float, optional
@@ -71,10 +71,10 @@ class Run:
     direction : {1, -1}
         Whether an arc-length run sets out to larger or to smaller volumes.
     solver : {"ipopt", "newton"}
-        Who solves under volume and pressure control; a height and arc length always take the bordered Newton corrector.
+        The solver under volume and pressure control. Heights and arc length always take the bordered Newton corrector.
     at_limit : {"stop", "jump"}
-        Under volume and pressure control, where the branch turns back before a load, or loses its stability at a branch point: end there,
-        or snap to the next stable state.
+        Under volume and pressure control a branch may turn back before a load, or lose its stability at a branch point. The run then ends
+        there, or snaps to the next stable state.
 
     Raises
     ------
@@ -119,7 +119,13 @@ class Run:
         return self.solver == "ipopt" and self.quantity in MINIMISED
 
     def loads(self) -> NDArray[np.float64]:
-        """The prescribed volumes or pressures, shape (number of equilibria,)."""
+        """The prescribed volumes, pressures or heights, shape (number of equilibria,).
+
+        Raises
+        ------
+        InputError
+            With arc length, which has no list of loads.
+        """
         if self.values is not None:
             return np.array(self.values)
         if self.start is None or self.stop is None or self.steps is None:

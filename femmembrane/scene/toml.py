@@ -84,9 +84,9 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "mesh": ("degree",),
     "effects": ("tension_field",),
 }
-#: size of a scene file: a million elements by their radii; what goes on for ever is none
+#: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
 MAX_BYTES = 2**25
-#: where else an argument without a default may come from, for the message when it is missing
+#: other sources of an argument without a default, for the message when it is missing
 _OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
 
 
@@ -123,7 +123,7 @@ def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def _line(text: str, reason: str) -> str:
-    """What stands in the line that a parser complains about."""
+    """The text of the line that a parser complains about."""
     found = re.search(r"at line (\d+)", reason)
     line = text.replace("\r\n", "\n").split("\n")[int(found[1]) - 1].strip() if found else ""
     shown = "".join(c if c.isprintable() else "?" for c in line[:60]) + ("..." if len(line) > 60 else "")
@@ -225,7 +225,7 @@ def _table(name: str, value: Any) -> Mapping[str, Any]:
 
 
 def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
-    """The object of a class from a table with its arguments; ``beside`` are further keys of the table that others read."""
+    """The object of a class from a table with its arguments. ``beside`` are further keys of the table, which are read elsewhere."""
     names = tuple(f.name for f in fields(cls))
     _refuse_unknown(path, table, (*beside, *names))
     for f in fields(cls):
@@ -271,7 +271,7 @@ def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Sca
 
 
 def item_path(name: str, index: int, count: int) -> str:
-    """How messages call one entry of a list of tables: ``source``, or ``source[2]`` where there are several."""
+    """Name of one entry of a list of tables in messages: ``source``, or ``source[2]`` where there are several."""
     return name if count == 1 else f"{name}[{index}]"
 
 
@@ -287,7 +287,7 @@ def _arguments(value: Any) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Lists, dictionaries and Python numbers only; what is not given is left out, for TOML has no null."""
+    """Lists, dictionaries and Python numbers only. None is left out, since TOML has no null."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items() if item is not None and item != ()}
     if isinstance(value, (tuple, list)):

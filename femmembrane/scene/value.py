@@ -48,29 +48,43 @@ class Scene:
     mesh : Meridian
         Reference meridian and its elements.
     degree : int
-        Polynomial degree of the elements, 1 to 8; left out: 2, or as chosen with a mesh for an accuracy (None until then).
+        Polynomial degree of the elements, 1 to 8. Left out: 2, or the degree chosen with a mesh for an accuracy (None until then).
     sources : sequence of Source
-        Magnetic sources around the axis; none: nothing magnetic is built.
+        Magnetic sources around the axis. Without a source nothing magnetic is built.
     susceptibility : float, optional
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
     radius_to_thickness : float, optional
-        R0/T > 0; enters the total stresses only. Left out: that of the scales, or 1000 without scales.
+        R0/T > 0; it enters the total stresses only. Left out: the ratio of the scales, or 1000 without scales.
     tension_field : bool
         Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
     title : str
+        Up to 1000 characters.
     run : Run, optional
         Equilibria that :func:`femmembrane.run` computes.
     analysis : Analysis
+        Questions asked of every equilibrium.
     scales : Scales, optional
-        Physical size and stiffness: stresses and pressures are then given in Pa as well. They change no equilibrium.
+        Physical size and stiffness. Stresses and pressures are then given in Pa as well. They change no equilibrium.
     loads : sequence of Load
-        Loads besides the pressure, such as ``Hydrostatic(gamma=...)``; none: nothing of them is built.
+        Loads besides the pressure, such as ``Hydrostatic(gamma=...)``. Without a load nothing of loads is built.
 
     Raises
     ------
     InputError
-        For a value that cannot be used, named by its key in a scene file (``mesh.elements``), and for scales that contradict
-        ``radius_to_thickness`` or hold the moment of no dipole.
+        For a value that cannot be used, named by its key in a scene file (``mesh.elements``). For scales that contradict
+        ``radius_to_thickness``, or whose moment no dipole has.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), title="a plain disc")
+    >>> scene.degree, scene.mesh.elements
+    (2, 16)
+    >>> beside = scene.replace(sources=[fm.Dipole(20.0, 2.5)], susceptibility=1.0)  # a scene never changes: this is another one
+    >>> for each in (scene, beside):
+    ...     print(f"{fm.equilibrium(each, volume=0.8).pressure:.4f}")
+    0.7608
+    0.0826
     """
 
     material: Material
@@ -119,7 +133,7 @@ class Scene:
         self._check_hubs()
 
     def _check_size(self) -> None:
-        """Refuse what there is no room for, before any of it is built."""
+        """Refuse a scene that the memory has no room for, before anything is built."""
         if self.open:
             return
         count, degree = self.mesh.elements, self.degree
@@ -139,7 +153,7 @@ class Scene:
             path = item_path("source", k, len(self.sources))
             allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
             _check_interface(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "sees", "refusal"), allowed)
-            # the axis is met at the ends of a meridian only: its breakpoints are enough; circles may lie between them
+            # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
             touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in source.circles)
@@ -176,7 +190,17 @@ class Scene:
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.
 
-        With new scales ``radius_to_thickness`` follows them; a mesh that is still to be chosen drops the degree.
+        With new scales ``radius_to_thickness`` follows them. A mesh that is still to be chosen drops the degree.
+
+        Parameters
+        ----------
+        **changes
+            Attributes of the scene and their new values.
+
+        Raises
+        ------
+        InputError
+            For an attribute that a scene does not have, and as for a new scene.
         """
         known = [f.name for f in fields(self)]
         for name, value in changes.items():
@@ -205,6 +229,7 @@ class Scene:
         Parameters
         ----------
         data : mapping
+            Tables, as :meth:`to_dict` gives them.
         folder : path
             Where the path of a mesh file starts from.
 
@@ -219,6 +244,10 @@ class Scene:
     def from_toml(cls, path: str | PathLike[str]) -> Self:
         """Read a scene file.
 
+        Parameters
+        ----------
+        path : path
+
         Raises
         ------
         InputError
@@ -228,6 +257,10 @@ class Scene:
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a scene file that :meth:`from_toml` reads back to an equal scene.
+
+        Parameters
+        ----------
+        path : path
 
         Raises
         ------
@@ -244,7 +277,7 @@ class Scene:
 
 
 def _too_far(source: Source) -> bool:
-    """Whether a field that is not finite is that of a source beyond the range of numbers, not of one on the membrane."""
+    """Whether a field is not finite because its source lies beyond the range of numbers, not because it lies on the membrane."""
     height = getattr(source, "height", 0.0)
     return isinstance(height, float) and abs(height) > 1
 

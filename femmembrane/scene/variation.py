@@ -9,8 +9,8 @@
 ``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
 ======================== ==================================================================================================
 
-The two rules for Ogden's material keep the sum of mu alpha at 2, that is the shear modulus at 1, the unit of stress; the number that is
-named is always the one that the scene of a value holds.
+The two rules for Ogden's material keep the sum of mu alpha at 2, and so the shear modulus at 1, the unit of stress. The scene of a value
+holds exactly this value of the named number.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..physics.materials import Ogden
 if TYPE_CHECKING:
     from .value import Scene
 
-#: added to a strength, so that its square root can be differentiated at zero; no strength above 1e-284 notices
+#: added to a strength, so that its square root can be differentiated at zero; strengths above 1e-284 do not change
 _TINY = 1e-300
 #: parts of a scene that are lists, by their names
 _LISTS = {"source": "sources", "load": "loads"}
@@ -75,7 +75,7 @@ class Parameter:
         return float(number[int(index)] if index else number)
 
     def scene_at(self, value: float) -> Scene:
-        """The scene with this value, checked like any other.
+        """The scene with this value, checked like every scene.
 
         The moment in the scales is left out once no dipole has the strength that belongs to it.
 
@@ -104,7 +104,7 @@ class Parameter:
         return self.scene.replace(sources=tuple(sources), scales=scales)
 
     def vary(self, value: Any) -> Any:
-        """The parts of the scene at a value that may be a symbol: nothing is checked, and nothing but formulas may use them."""
+        """The parts of the scene at a value that may be a symbol. They are not checked, and formulas alone may use them."""
         scene, (part, _, rest) = self.scene, self.name.partition(".")
         material: Any = scene.material
         sources: tuple[Any, ...] = scene.sources
@@ -162,7 +162,7 @@ def names(scene: Scene) -> list[str]:
 
 
 def _numbers(owner: Any) -> list[str]:
-    """The real arguments of an object; one declared as int (an orientation, a count) cannot vary continuously."""
+    """The real arguments of an object. An argument declared as int (an orientation, a count) cannot vary continuously."""
     if not dataclasses.is_dataclass(owner):
         return []
     real = [f.name for f in dataclasses.fields(owner) if f.init and f.type in ("float", float)]

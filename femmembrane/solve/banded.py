@@ -25,7 +25,8 @@ class BandFactor:
 
 
 class WideBorder:
-    """Solver for K with k borders, [K, B; C^T, D], through [K, b; b^T, 0]: regular wherever the whole matrix is, however singular K.
+    """Solver for K with k borders, [K, B; C^T, D], through [K, b; b^T, 0]. It is regular wherever the whole matrix is, even where K is
+    singular.
 
     With x = K_b^-1-part of (f - B y, t), t = b.x is one more unknown and the multiplier of b must vanish: k + 1 dense equations.
     """
@@ -61,8 +62,8 @@ def band_inner(band: Array, half_bandwidth: int, x: Array, y: Array) -> float:
 def negative_directions(band: Array, half_bandwidth: int, constraint: Array | None = None, compliance: float = 0.0) -> int:
     """Number of negative eigenvalues of K, of K restricted to ``constraint . x = 0``, or of K + constraint constraint^T/compliance.
 
-    An exact count, not a partial spectrum. A constraint is one more border with corner -compliance <= 0; it carries one negative direction
-    of its own.
+    The count is exact, by inertia. A constraint is one more border with corner -compliance <= 0, which adds one negative direction of its
+    own.
 
     Parameters
     ----------

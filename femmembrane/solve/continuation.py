@@ -31,12 +31,12 @@ _BOTH_ENDS = 10.0
 class StepControl:
     """How long the steps along a branch are.
 
-    Attributes
+    Parameters
     ----------
     first, smallest, largest : float
-        Arc length of the first step and its limits.
+        Arc length of the first step, and bounds on the length of all steps.
     deviation : float
-        Wanted distance between prediction and corrected point, relative to the step.
+        Distance between prediction and corrected point that steps aim at, relative to the step.
     turn : float
         Largest angle between neighbouring tangents, in radians.
     """

@@ -1,10 +1,10 @@
 """What is prescribed while an equilibrium is sought.
 
-An equilibrium of E - P V has the n + 1 unknowns (x, P); the out-of-balance force E' - P V' = 0 gives n equations and a control the last
-one, N(x, P) = 0. Every control is solved by the same bordered Newton corrector.
+An equilibrium of E - P V has the n + 1 unknowns (x, P). The balance of forces E' - P V' = 0 gives n equations, and a control gives the last
+one, N(x, P) = 0. The same bordered Newton corrector solves every control.
 
-What can be prescribed is listed once, in :data:`CONTROLS`: whoever needs the equation of a control, its value in a state, or whether a
-minimiser can hold it, asks there. A new control is a line of that table, its equation, and a cold start in :mod:`.start`.
+:data:`CONTROLS` is the only list of what can be prescribed. It knows the equation of a control, its value in a state, and whether a
+minimiser can hold it. A new control is a line of that table, its equation, and a cold start in :mod:`.start`.
 """
 
 from __future__ import annotations
@@ -22,10 +22,20 @@ from ..scene.run import MINIMISED, PRESCRIBED
 
 
 class Control(Protocol):
-    """One scalar equation N(x, P) = 0 beside equilibrium, written as (what is held) - (its value)."""
+    """One scalar equation N(x, P) = 0 beside equilibrium, written as (quantity in the state) - (value to be held)."""
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
-        """N, dN/dx (shape (n_free,)) and dN/dP."""
+        """N, dN/dx (shape (n_free,)) and dN/dP.
+
+        Parameters
+        ----------
+        space : Space
+        x : ndarray, shape (n_free,)
+            Displacement coefficients of the state.
+        pressure : float
+        evaluation : Evaluation
+            Of the potential in this state.
+        """
 
 
 @dataclass(frozen=True)
@@ -91,15 +101,33 @@ class Gas:
         convert(self, "gas.atmosphere", "a finite number >= 0 is allowed", least=0)
 
     def pressure(self, volume: float) -> float:
-        """Pressure over the atmosphere at a volume of the membrane."""
+        """Pressure over the atmosphere at a volume of the membrane.
+
+        Parameters
+        ----------
+        volume : float
+            Over R0^3.
+        """
         return self.amount / (volume + self.chamber) - self.atmosphere
 
     def compliance(self, volume: float) -> float:
-        """-dV/dP at constant amount."""
+        """-dV/dP at constant amount.
+
+        Parameters
+        ----------
+        volume : float
+            Over R0^3.
+        """
         return (volume + self.chamber) ** 2 / self.amount
 
     def at(self, amount: float) -> Gas:
-        """Another amount of the gas, in the same chamber."""
+        """Another amount of the gas, in the same chamber.
+
+        Parameters
+        ----------
+        amount : float
+            In units of mu T R0^2.
+        """
         return replace(self, amount=amount)
 
     def value(self, space: Space, x: Array, pressure: float, volume: float) -> float:
@@ -107,7 +135,7 @@ class Gas:
         return (pressure + self.atmosphere) * (volume + self.chamber)
 
     def rate(self, space: Space, pressure: float, evaluation: Evaluation, dx: Array, dp: float) -> float:
-        """Derivative of that amount along a direction (dx, dP)."""
+        """Derivative of the amount along a direction (dx, dP)."""
         total, absolute = evaluation.volume + self.chamber, pressure + self.atmosphere
         return dp * total + absolute * float(evaluation.volume_gradient @ dx)
 
@@ -118,7 +146,7 @@ class Gas:
 
 @dataclass(frozen=True, eq=False)
 class ArcLengthControl:
-    """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0, the inner product already applied to the tangent (its dual)."""
+    """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0. ``dual`` is the tangent with the inner product already applied."""
 
     dual: Array
     dual_pressure: float
@@ -137,10 +165,29 @@ class Controlled(Protocol):
         """The control that holds the number at a load."""
 
     def value(self, space: Space, x: Array, pressure: float, volume: float) -> float:
-        """The number in a state."""
+        """The number in a state.
+
+        Parameters
+        ----------
+        space : Space
+        x : ndarray, shape (n_free,)
+            Displacement coefficients of the state.
+        pressure, volume : float
+        """
 
     def rate(self, space: Space, pressure: float, evaluation: Evaluation, dx: Array, dp: float) -> float:
-        """Derivative of the number along a direction (dx, dP)."""
+        """Derivative of the number along a direction.
+
+        Parameters
+        ----------
+        space : Space
+        pressure : float
+        evaluation : Evaluation
+            Of the potential in the state.
+        dx : ndarray, shape (n_free,)
+        dp : float
+            The direction (dx, dP).
+        """
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The same equilibrium in another finite-element space of its scene: carried over by interpolation and solved again.
 
-How far an answer moves when the space grows says how far it is from that of the continuum.
+An answer that moves far when the space grows is far from the answer of the continuum.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from .state import State, distance
 
 #: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
 FAR = 0.2
-#: spaces, each finer than the one before, in which a doubtful answer is looked at again
+#: number of spaces, each finer than the last, in which a doubtful answer is checked
 LEVELS = (1, 2)
-#: relative residual above which a state is no equilibrium, and none of another space stands for it
+#: relative residual above which a state is no equilibrium, so that no state of another space stands for it
 _BALANCED = 1e-6
 #: most iterations of a damped solve: ordinary ones take one to three
 _MAX_ITERATIONS = 30
@@ -53,7 +53,7 @@ def solved_in(
 
 
 def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> NewtonResult:
-    """Where the branch of another space crosses the plane through a point of a branch, across its tangent: regular at every fold."""
+    """Where the branch of another space crosses the plane through a point of a branch, across its tangent; regular at every fold."""
     state = point.state
     start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
     dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / (onto.area * onto.space.unit**2)
@@ -63,7 +63,9 @@ def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> New
 
 
 def solved_past_folds(onto: Potential, control: Control, potential: Potential, state: State) -> NewtonResult:
-    """As :func:`solved_in`, for a state next to a fold of the control: the branch is :func:`met_across` first, and then followed to it."""
+    """As :func:`solved_in`, for a state next to a fold of the control. The branch is :func:`met_across` first, and then followed to the
+    state.
+    """
     result = met_across(onto, potential, first_point(potential, state, 1))
     if result.status is not Status.CONVERGED:
         return result
@@ -73,7 +75,7 @@ def solved_past_folds(onto: Potential, control: Control, potential: Potential, s
 def counterpart(
     potential: Potential, evaluation: Evaluation, pressure: float | None = None, held: str = "volume", level: int = 1
 ) -> NewtonResult | None:
-    """The state of an evaluation in a finer space, whose potential is ``result.evaluation.potential``; None where there is none.
+    """The state of an evaluation in a finer space, with the potential ``result.evaluation.potential``; None where it was not found.
 
     Parameters
     ----------

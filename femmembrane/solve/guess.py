@@ -29,7 +29,7 @@ def guess_at_volume(potential: Potential, volume: float) -> Array:
 
 
 def _direction(space: Space, volume: float) -> Array:
-    """Displacement along which the shape changes its volume: of one without edges, its own growth, which crosses the axis nowhere."""
+    """Displacement along which the shape changes its volume. A shape without edges grows as it is, so that it crosses the axis nowhere."""
     if not space.edges and volume * space.reference_volume > 0:
         return space.interpolate(*space.mesh.position(space.interpolation_points()))
     return space.unit * _normal(space)

@@ -1,4 +1,4 @@
-"""From a state that certainly exists to one that is wanted, by arc length in what holds or pulls the membrane.
+"""From a state that certainly exists to a wanted state, by arc length in what holds or pulls the membrane.
 
 Every equilibrium is a root of R(x, P) = E' - P V' and of a control N(x, P). Two families of problems lead to it, each with a number t
 that is 0 where a state is known and 1 where it is wanted:
@@ -7,8 +7,8 @@ that is 0 where a state is known and 1 where it is wanted:
   of the guess. At t = 0 the guess is an equilibrium, whatever it is. One whole step from there is Newton's method.
 * :class:`Fields`: sources and loads are turned on, with the factor t on their energy.
 
-The path of (x, P, t) is followed by arc length, so that it may turn back in t, for a bounded number of steps. Where it leads depends on
-the guess; that it arrives at an equilibrium does not, for the last point is solved as one.
+The path of (x, P, t) is followed by arc length, so that it may turn back in t, for a bounded number of steps. Where the path leads depends
+on the guess. Its last point is solved as an equilibrium, whatever the guess.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .state import State, distance
 MAX_STEPS, _MAX_CORRECTIONS = 150, 8
 #: first and smallest step, in the arc length of (displacement over its size at first, t)
 _FIRST, _SMALLEST = 0.1, 1e-5
-#: correction at which a point of the path is good enough to go on from; change by the corrector, over the step, that is too much
+#: correction at which a point of the path is good enough to go on from; and largest change by the corrector, over the step
 _CLOSE, _MISS = 1e-7, 0.3
 
 
@@ -120,7 +120,7 @@ def follow_homotopy(family: Family, x: Array, pressure: float, *, accept: Callab
         Which states will do; the path goes on beyond others, and may come back to t = 1.
     """
     path = _Path(family, x)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a trial step may be absurd: it is refused by what it gives
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a trial step may be absurd: it is refused by its result
         point = path.first(np.concatenate([x, [pressure, 0.0]]))
         step = _FIRST
         for _ in range(MAX_STEPS):

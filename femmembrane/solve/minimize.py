@@ -1,8 +1,8 @@
 """Energy minimisation by IPOPT under volume or pressure control.
 
-IPOPT's word is not taken: the caller recomputes residual, constraint and inertia (:mod:`.newton`, :mod:`..stability`). The unknowns
-are scaled by the size of u and w in the guess, so that a nearly flat membrane (w of order V, u of order V^2, E of order V^4) is the same
-problem to IPOPT as a well inflated one.
+IPOPT's word is not taken: the caller recomputes residual, constraint and inertia (:mod:`.newton`, :mod:`..stability`). The unknowns are
+scaled by the size of u and w in the guess. A nearly flat membrane has w of order V, u of order V^2 and E of order V^4; the scaling makes it
+the same problem to IPOPT as a well inflated one.
 """
 
 from __future__ import annotations
@@ -168,9 +168,9 @@ def minimize_and_verify(
 def _on_branch_of_guess(
     potential: Potential, control: Control, x: Array, pressure: float, magnetic: float, found: NewtonResult
 ) -> NewtonResult:
-    """The minimiser's state, or the one that Newton's method finds from the guess where that is another and nearer one.
+    """The minimiser's state, or the state that Newton's method finds from the guess if this is another one and nearer.
 
-    Where its branch is unstable a minimiser goes downhill to another one, or stays on it: round-off and the mesh decide which.
+    Where the branch is unstable a minimiser may stay on it, or go downhill to another branch: round-off and the mesh decide.
     """
     own = correct(potential, control, x, pressure, magnetic=magnetic)
     if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * distance(potential, found.x, np.zeros_like(x)):

@@ -16,15 +16,15 @@ from .controls import ArcLengthControl, Control, VolumeControl
 TOLERANCE = 1e-10
 #: relative residual that a state must show whose own correction was not computed
 RESIDUAL = 1e-12
-#: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it: one along which
-#: the membrane is so soft, such as a shift of a bulge in a long tube, that round-off decides it
+#: residual that is round-off, for a membrane as wide as it is long, and the largest correction that may remain with it; round-off decides
+#: corrections along very soft directions, such as the shift of a bulge in a long tube
 ROUND_OFF, SOFT = 2e-14, 1e-4
-#: residual from which on corrections along a soft direction go on, in the hope of one that ends in balance
+#: residual from which on corrections along a soft direction go on, since one of them may end in balance
 NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
-#: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
+#: largest force of a correction of P, relative to the forces that meet at a node: a guess may have the right shape and a wrong P
 PRESSURE = 1e-9
 
 
@@ -92,7 +92,7 @@ def correct(
         stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if stalled and size <= 100 * SOFT and not done:
             before, unbalance = unbalance, equations.residual
-            # along a soft direction corrections are round-off while forces still come into balance, or stay all but balanced
+            # along a soft direction corrections are round-off, while the forces are balanced or still come into balance
             stalled = unbalance > max(1e-2 * before, NEARLY_BALANCED * potential.space.slenderness)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
@@ -100,8 +100,8 @@ def correct(
         x, pressure = (x + dx, pressure + dp) if length == 1 else (x + length * dx, pressure + length * dp)
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
-        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x and the correction that the
-        # factors at hand make of it (next to a limit point a small residual may be far from the solution) have the last word
+        # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, together
+        # with its correction by the factors at hand: next to a limit point a state with a small residual may be far from the solution
         foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
@@ -139,7 +139,7 @@ class Equations:
 
     @property
     def on_control(self) -> bool:
-        """Whether the control is met to round-off of its own terms; nobody asked for a particular arc length."""
+        """Whether the control is met to round-off of its own terms. Arc length always counts as met: its value is nobody's target."""
         if isinstance(self.control, ArcLengthControl):
             return True
         terms = float(abs(self._row @ self.x) + abs(self._corner * self.pressure))
@@ -147,7 +147,7 @@ class Equations:
 
     @property
     def at_round_off(self) -> bool:
-        """Whether no correction can be told from round-off: forces balance as far as positions are known, and the control is met."""
+        """Whether corrections are round-off: forces balance as far as positions are known, and the control is met."""
         return self.residual <= ROUND_OFF * self.potential.space.slenderness and self.on_control
 
     @property
@@ -171,11 +171,13 @@ class Equations:
         return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
     def newton_step(self) -> tuple[Array, float]:
-        gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
+        gap = (
+            self.gap if abs(self.gap) > self._round_off else 0.0
+        )  # next to rest the correction would move the membrane by more than its displacement
         return self._factored.solve(self.unbalanced, -gap)
 
     def size(self, dx: Array) -> float:
-        """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""
+        """:func:`relative_size` of a correction, without a component that is zero and in balance to round-off."""
         largest = self.evaluation.elements.largest
         change, size = largest(dx), largest(self.x)
         worst = _relative(change, size)
@@ -237,7 +239,7 @@ def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
 
 def residuals_over(size: tuple[float, float], scales: tuple[float, float]) -> tuple[float, float]:
     """Out-of-balance forces along u and along w over the forces that meet at a node."""
-    # where no force acts along one of them, what is there is round-off of the other
+    # a component without forces along it holds round-off of the other component
     least = _EPSILON * max(scales)
     u, w = (r / max(s, least) if r else 0.0 for r, s in zip(size, scales, strict=True))
     return u, w

@@ -21,14 +21,15 @@ from .state_resolution import unresolved
 from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest
 from .wellposed import ill_posed, is_slack
 
-#: volumes from which branches and deflated iterations set out: beyond that at rest, in units of what a moderately inflated membrane holds
-#: more than at rest
+#: volumes from which branches and deflated iterations set out: less the volume at rest, in units of what a moderately inflated membrane
+#: holds more than at rest
 STARTS = (1.0, -1.0, 10.0, -10.0, 100.0, -100.0)
 #: two states closer than this are the same, relative to the size of the displacement
 SAME = 1e-6
 #: a branch is no longer followed beyond this many times what a moderately inflated membrane holds more than at rest
 FAR = 2e4
-#: stiffness of one displacement over that of all others below which states are looked for along it, and how far, relative to the size
+#: states are looked for along a displacement whose stiffness over the stiffness of all others is below this; and how far, relative to the
+#: size
 SOFT, KICKS = 0.2, (-0.3, 0.3)
 #: most branch points at which the other branch is followed
 MOST_CROSSINGS = 16
@@ -103,7 +104,7 @@ class Search:
         return volumes
 
     def _meets_known_branch(self, segment: Segment) -> bool:
-        """Note the branch points on a segment; whether the branch comes in there on a half of the other one, which is known then."""
+        """Note the branch points on a segment. Whether the branch arrives there on a half of the crossing branch, which is then known."""
         for located in crossings_on(self.potential, segment):
             for crossing in self.crossings:
                 if same_crossing(self.potential, crossing.known.state.x, located.point.state.x):
@@ -125,7 +126,7 @@ class Search:
                 self._halves += [(crossing, 1), (crossing, -1)]
 
     def _on_traced_branch(self, state: State) -> bool:
-        """Whether a state lies between two traced points of nearly the same shape: a start on a known branch is not traced again."""
+        """Whether a state lies between two traced points of nearly the same shape. A start on a known branch is not traced again."""
         reach = 0.5 * (self.potential.space.units["volume"] + abs(state.volume))
         near = [p for p in self._points if abs(p.state.volume - state.volume) < reach]
         scale = distance(self.potential, state.x, np.zeros_like(state.x))
@@ -136,7 +137,7 @@ class Search:
         return False
 
     def _add(self, state: State) -> bool:
-        """Keep a state unless it is known; one that is ill-posed or not resolved is a shape of this mesh, remembered only to be avoided."""
+        """Keep a state unless it is known. An ill-posed or unresolved state depends on the mesh: it is remembered only to be avoided."""
         if self._known(state.x):
             return False
         kept = self.states
@@ -168,9 +169,9 @@ class Search:
         return None
 
     def _partners(self, state: State) -> list[Array]:
-        """Guesses for states that would be connected to one if the scene had a symmetry that it lacks: where a small asymmetry breaks a
-        pitchfork no branch crosses, and one half of the other branch is on its own. They are its mirror image and, where one displacement
-        lowers the energy or meets far less resistance than all others, the shapes on both sides along it.
+        """Guesses for states that a symmetry would connect to a known state if the scene had it. A small asymmetry breaks a pitchfork: no
+        branch crosses there, and one half of the other branch is on its own. They are its mirror image and, where one displacement lowers
+        the energy or meets far less resistance than all others, the shapes on both sides along it.
         """
         shapes = self.potential.space.mirrored(state.x)
         with suppress(SolveError):
@@ -207,7 +208,7 @@ class Search:
 
 
 def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator[Segment]:
-    """Segments of a branch until a step fails, the limit is reached, or a tension field is slack and what follows is the mesh's."""
+    """Segments of a branch until a step fails, the limit is reached, or a tension field is slack and depends on the mesh."""
     tracer = Tracer(Predictor(), StepControl().first, StepControl())
     points = trace_points(potential, point, tracer)
     for _ in range(max_steps):
@@ -237,7 +238,7 @@ def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_
 
 
 def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
-    """The branch points on a segment that can be located, but for those of folded shapes of the mesh."""
+    """The branch points on a segment that can be located. Branch points of folded shapes, which depend on the mesh, are left out."""
     try:
         if not branches_crossing(segment) or all(ill_posed(potential, point.state.evaluation) for point in (segment.a, segment.b)):
             return []
@@ -249,11 +250,11 @@ def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
 
 @dataclass(slots=True)
 class Limit:
-    """Why a load cannot be reached: the fold where the branch turns back, or the branch point from which on it is unstable, and the next
-    stable state at the load, if there is one.
+    """Why a load cannot be reached: the fold where the branch turns back, or the branch point where it becomes unstable. With it comes the
+    next stable state at the load, if there is one.
 
-    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became so, slack or compressed,
-    before either was met: what follows is the mesh's.
+    ``last`` is the last state on the way along the branch. ``ill_posed`` is the state at which the branch became slack or compressed before
+    either was met. What follows depends on the mesh.
     """
 
     fold: Located | None
@@ -272,9 +273,8 @@ def beyond_limit(
     any_before: bool = False,
     max_steps: int = 300,
 ) -> Limit:
-    """Follow the branch from the last state before a load that was not reached by steps in the load itself.
-
-    So close to a fold such steps can fail on this side of it: then there is a landing and no fold.
+    """Follow the branch from the last state before a load that was not reached by steps in the load itself. Close to a fold such steps can
+    fail on this side of it: then there is a landing and no fold.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def beyond_limit(
         crossing = None if any_before else next(iter(crossings_on(potential, segment)), None)
         if fold is None:
             fold = next(iter(segment.folds(kind)), None)
-            # a branch that ends on another one turns back there: what is met is the other one
+            # a branch that ends on another branch turns back there: what is met is the other branch
             if crossing is not None and (fold is None or crossing.point.sigma - fold.point.sigma <= SAME_CROSSING * segment.length):
                 for met in segment.crossings(quantity, load):
                     if met.sigma < crossing.point.sigma and stable(met.state):
@@ -320,7 +320,7 @@ def beyond_limit(
 def beyond_crossing(
     potential: Potential, located: Located, quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
 ) -> State | None:
-    """The first stable state at a load on the other branch at a branch point; None where neither half has one."""
+    """The first stable state at a load on the branch that crosses at a branch point; None if neither half has one."""
     try:
         crossing = crossing_at(potential, located.point)
     except SolveError:
@@ -341,7 +341,7 @@ def beyond_crossing(
 def loss_before(
     potential: Potential, state: State, quantity: str, stable: Callable[[State], bool], *, max_steps: int = 300
 ) -> Located | None:
-    """Where the branch through an unstable state was stable last: the branch point or fold on the way back, None if there is none."""
+    """The branch point or fold at which the branch through an unstable state was stable last; None if the way back has none."""
     kind = next(k for k, q in FOLDS.items() if q == quantity)
     here = state.volume - potential.space.reference_volume
     for direction in (-1, 1) if here > 0 else (1, -1):

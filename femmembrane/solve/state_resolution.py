@@ -33,8 +33,8 @@ _SMOOTH = 0.2
 _STEADY = 0.1
 #: meridional stress beside a kink, over the median one of the membrane, below which it is the stress that fails and not the mesh
 _WEAK = 0.1
-#: change of the membrane, relative to its size, up to which a state at the same volume is the same one (few elements let all of a thin pole
-#: be wrong), and one at about that volume
+#: change of the membrane, relative to its size, up to which a state is the same one: for a state at the same volume (few elements let all
+#: of a thin pole be wrong), and for a state at about this volume
 _NEAR, _CLOSE = 1.0, 0.05
 #: relative change of the pressure in a finer space that a layer of compression may make which is the mesh's alone
 _LAYER = 0.02
@@ -109,8 +109,8 @@ def _judged_otherwise(potential: Potential, state: State, where: int) -> bool:
 def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str:
     """What becomes of the state as elements are halved; empty where it is found again and loses its kinks."""
     first = largest_kink(potential, state.x)
-    # the tip that a source draws out becomes round on very small elements alone, but its stretches are right long before
-    # and so are those of a layer at a rim, which is as thin as the membrane makes it
+    # the tip that a source draws out becomes round on very small elements alone, but its stretches are right long before; the stretches of
+    # a layer at a rim are right early as well, and it is as thin as the membrane makes it
     tip = bool(potential.sources) or where < potential.space.n_elements - 1
     kink, largest = first, _largest_stretch(potential, state.x)
     for halving in range(_HALVINGS):

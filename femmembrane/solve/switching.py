@@ -6,7 +6,7 @@ bifurcation equation, with the exact second derivatives of F::
 
     a alpha^2 + 2 b alpha beta + c beta^2 = 0,        a = phi . F''[g, g],    b = phi . F''[g, phi],    c = phi . F''[phi, phi]
 
-Its two solutions are the tangents of the two branches; the known branch is the one that its points on both sides lie along. Where c
+Its two solutions are the tangents of the two branches. The points of the known branch on both sides tell which tangent is its own. Where c
 vanishes, as a symmetry demands, one of the branches runs along phi itself, with stationary pressure and volume: a pitchfork. Else the
 crossing is transcritical.
 
@@ -41,7 +41,7 @@ _DIFFERENCE = 6e-6
 _ITERATIONS = 6
 #: how often the first step off the known branch is halved
 _HALVINGS = 12
-#: a rate of the volume this small beside the terms that cancel in it is none
+#: a rate of the volume this small beside the terms that cancel in it counts as zero
 _STATIONARY = 1e-5
 #: two located crossings closer than this, relative to the size of the displacement, are one
 SAME_CROSSING = 1e-3
@@ -97,7 +97,7 @@ def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
     square = b * b - a * c
     if not square > SYMMETRIC**2 * (size_b * size_b + size_a * size_c):
         raise SolveError("the branches that meet there could not be told apart", status=Status.NOT_CONVERGED)
-    larger = -(b + math.copysign(math.sqrt(square), b))  # the root that does not cancel; the other one by their product
+    larger = -(b + math.copysign(math.sqrt(square), b))  # the root without cancellation; the second root follows from their product
     tangents = [_combined(rest, null, alpha, beta) for alpha, beta in ((c, larger), (larger, a))]
     cosines = [_along(tangent, known.tangent, known.tangent_pressure) for tangent in tangents]
     mine = int(abs(cosines[1]) > abs(cosines[0]))
@@ -155,8 +155,7 @@ def same_crossing(potential: Potential, a: Array, b: Array) -> bool:
 
 
 def softest(potential: Potential, state: State) -> tuple[Array, float]:
-    """The displacement at constant volume against which a state is softest, and its stiffness, signed, over the size of
-    that of the next one.
+    """The softest displacement at constant volume, and its signed stiffness over the size of the next stiffness.
 
     At a branch point it is phi, with K phi = 0 and V' . phi = 0, and the stiffness 0. Inverse iteration on two vectors.
 
@@ -238,7 +237,9 @@ def _first(evaluation: Evaluation, phi: Array, v: Array, v_pressure: float) -> A
 
 
 def _upwards(potential: Potential, point: BranchPoint) -> float:
-    """What the first half of a branch lets grow: the volume, where it is stationary the height of the pole, else that of the membrane."""
+    """What grows on the first half of a branch: the volume; if it is stationary, the height of the pole; if the pole is held, the height of
+    the membrane.
+    """
     border, space = point.state.evaluation.volume_gradient, potential.space
     rate = border @ point.tangent
     if abs(rate) > _STATIONARY * (np.abs(border) @ np.abs(point.tangent)):
@@ -255,7 +256,7 @@ def _upwards(potential: Potential, point: BranchPoint) -> float:
 
 
 def _on_known(potential: Potential, crossing: Crossing, x: Array, p: float) -> bool:
-    """Whether a state near the crossing is that of the known branch as far along it."""
+    """Whether a state near the crossing is the state of the known branch at the same distance."""
     known = crossing.known
     dx = x - known.state.x
     here, pressure = known.state.x, known.state.pressure

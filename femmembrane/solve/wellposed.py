@@ -64,7 +64,9 @@ class IllPosed:
 
 
 def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
-    """Where the equilibrium of an evaluation is ill-posed; None where it is nowhere, or a finer space says so of what this one shows."""
+    """Where the equilibrium of an evaluation is ill-posed. None if it is well-posed, or if a finer space does not confirm what this space
+    shows.
+    """
     found = apparent(potential, evaluation)
     if found is None:
         return None
@@ -75,7 +77,7 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
 
 
 def _nearly_slack(evaluation: Evaluation) -> bool:
-    """Whether little meridional tension is left anywhere: a mesh folds before the membrane does, the sooner the coarser it is."""
+    """Whether some point has little meridional tension left. A mesh folds before the membrane does, and a coarse mesh first."""
     return apparent(evaluation.potential, evaluation) is not None or bool(
         evaluation.stress[0].min() < _LITTLE * np.abs(evaluation.stress).max()
     )

@@ -133,8 +133,8 @@ class ShortWaves:
 def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves]:
     """Where ever shorter waves with n >= 1 waves around the axis have ever lower eigenvalues; empty if nowhere.
 
-    A principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails. In a tension field no stress is; there the
-    meridional one may vanish, while without hoop stress the operator of one n is as good as any.
+    A principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails. In a tension field no stress is
+    compressive. There the meridional stress may vanish; without hoop stress the operator of one n is as good as any.
     """
     if potential.scene.tension_field:
         bad = ill_posed(potential, evaluation)

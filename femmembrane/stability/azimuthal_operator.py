@@ -134,8 +134,8 @@ def _rigid_motions(space: Space, r: LocalResponse, n: int) -> Array:
 def _spin(space: Space, layout: WaveUnknowns, r: LocalResponse, rigid: Array, pencil: Pencil) -> Array | None:
     """The mass times the motion of a sphere's material in itself under its deformed shape; None where it is a rigid one.
 
-    Turned about an axis through its equator, a uniform sphere is the same sphere: whatever is integrated over its reference area, energies
-    of sources and loads included, stays as it is when the material moves along so. With v = (v_S, v_theta) the velocities of that rotation
+    A uniform sphere that is turned about an axis through its equator is the same sphere. So integrals over its reference area do not change
+    when the material moves in this way, energies of sources and loads included. With v = (v_S, v_theta) the velocities of that rotation
     along the reference sphere the motion is x_S v_S + x_theta v_theta/R. Of a round shape it is a tilt of the whole.
     """
     J = np.hypot(space.R_x, space.Z_x)

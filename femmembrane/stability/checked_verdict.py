@@ -28,7 +28,8 @@ _SLOWEST = 0.1
 _FALSE = "stress is compressive on this mesh alone, not on finer elements"
 #: discretisation errors are estimated to a factor of two or so: this many times the estimate contain them
 SAFETY = 3.0
-#: part of a small eigenvalue below which one is zero: that of a marginal state of this mesh, or of a mesh on which zero means zero
+#: part of a small eigenvalue below which an eigenvalue counts as zero: for a marginal state of this mesh, and for a mesh on which zero
+#: means zero
 _ZERO = 0.1
 
 
@@ -58,7 +59,7 @@ def checked_verdict(
     ask = partial(_verdict, control=control, azimuthal=azimuthal, compliance=compliance)
     try:
         verdict = ask(potential, x, pressure, evaluation, guess=guess)
-    except SpectrumError as error:  # one verdict that cannot be proved must not cost the run that asked for it
+    except SpectrumError as error:  # a verdict that cannot be proved must not end the run that asked for it
         return Verdict(None, np.nan, np.nan, control, azimuthal, None, f"not decided: {error}")
     value = abs(verdict.smallest_eigenvalue)
     if value < max(small_eigenvalue(potential.space), _CLEAR * verdict._unresolved):  # never for NaN
@@ -87,13 +88,14 @@ def _verdict(
 def _with_discretisation_error(
     verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict]
 ) -> Verdict:
-    """Solve again on elements of one degree more (or half the size): by how much an eigenvalue moves decides its sign.
+    """Solve again on elements of one degree more (or half the size). The change of an eigenvalue decides whether its sign is known.
 
-    Where the sign stays open although the mesh is too coarse to call it zero, a still finer space is tried; what it settles is reported.
+    The sign may stay open although the mesh is too coarse to call the eigenvalue zero. A still finer space is then tried, and its answer is
+    reported.
     """
     value, unknown = verdict.smallest_eigenvalue, _CLEAR * verdict._unresolved
     better = _finer_verdict(verdict, potential, pressure, evaluation, ask, 1)
-    if better is None:  # nothing to compare with: the part that is not resolved stands for the error
+    if better is None:  # there is nothing to compare with: the unresolved part stands for the error
         return verdict if abs(value) >= unknown else _open(verdict, unknown)
     change = abs(better.smallest_eigenvalue - value)
     error, hidden = verdict.error + SAFETY * change, abs(value) <= verdict._unresolved
@@ -107,7 +109,7 @@ def _with_discretisation_error(
     if best is None:
         return _open(verdict, error)
     rest = abs(best.smallest_eigenvalue - better.smallest_eigenvalue)
-    # changes that shrink slowly add up, as those of a geometric series, and may yet grow where convergence has hardly begun
+    # changes that shrink slowly add up like a geometric series, and they may still grow where convergence has hardly begun
     error = verdict.error + 2 * SAFETY * max(change / max(1 - rest / change, _SLOWEST) if change else 0.0, change + rest)
     if abs(value) > error and np.isfinite(verdict._unresolved):
         return replace(verdict, error=error)
@@ -124,7 +126,7 @@ def _finer_verdict(
     verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict], level: int
 ) -> Verdict | None:
     """The same question about the same state in a finer space, the mode interpolated; None where there is no answer."""
-    # held is the volume, unless this eigenvalue vanishes at its folds
+    # the volume is held, unless this eigenvalue vanishes at volume folds
     at_fold = verdict.control == "volume" and abs(verdict.smallest_eigenvalue) < small_eigenvalue(potential.space)
     found = counterpart(potential, evaluation, pressure, "pressure" if at_fold else "volume", level)
     if found is None:

@@ -1,13 +1,13 @@
 """Natural frequencies: small oscillations of the membrane about an equilibrium.
 
-A perturbation phi exp(s t) obeys s^2 M phi = -K phi, with K the second variation and M the mass of the reference area, so that the
-eigenvalues lambda of a verdict are squared frequencies. Each gives a pair of roots s = +- sqrt(-lambda)::
+A perturbation phi exp(s t) obeys s^2 M phi = -K phi, with K the second variation and M the mass of the reference area. So the eigenvalues
+lambda of a verdict are squared frequencies. Each gives a pair of roots s = +- sqrt(-lambda)::
 
     lambda > 0     s = +- i omega             oscillation, omega = sqrt(lambda)
     lambda < 0     s = +- growth_rate         departure, growth_rate = sqrt(-lambda)
 
-The gas has no inertia of its own here, and there is no damping. Whether a state is stable is for its verdicts to say: they know how far
-an eigenvalue near zero is to be believed.
+The gas has no inertia of its own here, and there is no damping. Verdicts say whether a state is stable: they know how far an eigenvalue
+near zero can be trusted.
 """
 
 from __future__ import annotations

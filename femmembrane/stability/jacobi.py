@@ -1,10 +1,10 @@
 """The paper's tests of Legendre and Jacobi, as printed and corrected: a cross-check of the verdicts, by ordinary differential equations.
 
-With F(y, y', r) the integrand of the energy minus P times the volume of a disc, y = (rho, eta) and ' = d/dr, a state is a minimum under
-pressure control among axisymmetric perturbations if F_y'y' is positive definite (Legendre, paper eq. 40) and no point of (0, 1] is
-conjugate to the pole (Jacobi, paper eqs. 42-45): det U has no zero, where the columns of U are the perturbations that satisfy the
-equation of the second variation and the conditions at the pole. Both forms are integrated with a momentum, so that no coefficient has to
-be differentiated::
+Let F(y, y', r) be the integrand of the energy minus P times the volume of a disc, with y = (rho, eta) and ' = d/dr. A state is a minimum
+under pressure control among axisymmetric perturbations if two conditions hold: F_y'y' is positive definite (Legendre, paper eq. 40), and no
+point of (0, 1] is conjugate to the pole (Jacobi, paper eqs. 42-45). At a conjugate point det U = 0. The columns of U are the perturbations
+that satisfy the equation of the second variation and the conditions at the pole. Both forms are integrated with a momentum V, so that no
+coefficient has to be differentiated::
 
     F_y'y' U' + H U = V,        V' = F_yy' U' + F_yy U
 
@@ -16,8 +16,8 @@ corrected   F_y'y = (F_yy')^T    rho column (r, 0), eta column (0, 1): eta free,
 ==========  ===================  =====================================================
 
 The two differ because F_yy' is not symmetric (F_rho,eta' - F_eta,rho' = W_12 eta'/lambda_1 + P rho), and because the pole is free to move
-along the axis. F_y'y' vanishes at the pole, where the printed conditions therefore have no solution: an eta column that starts at the
-radius e with (0, e) and slope 1 is e (1 + log(r/e)) near it, so that the printed answer depends on where the integration starts.
+along the axis. F_y'y' vanishes at the pole, and the printed conditions have no solution there: an eta column that starts at the radius e
+with (0, e) and slope 1 is e (1 + log(r/e)) near the pole. So the printed answer depends on where the integration starts.
 """
 
 from __future__ import annotations
@@ -74,13 +74,13 @@ class JacobiTest:
     ----------
     form : {"corrected", "printed"}
     conjugate_points : ndarray
-        Reference radii in (0, 1] at which det U = 0. In the corrected form they are as many as the negative eigenvalues of the second
+        Reference radii in (0, 1] at which det U = 0. In the corrected form their number is the number of negative eigenvalues of the second
         variation under pressure control.
     r, det : ndarray
         The curve det U(r), as integrated.
     conclusion : str
-        "stable" without conjugate points; with them "unstable" (corrected) or, in the paper's word, "unclear" (printed); "short-wave
-        unstable" where Legendre's condition fails, in which case nothing is integrated.
+        "stable" without conjugate points; with them "unstable" (corrected) or, in the paper's word, "unclear" (printed). Where Legendre's
+        condition fails it is "short-wave unstable", and nothing is integrated.
     """
 
     form: str
@@ -93,7 +93,15 @@ class JacobiTest:
 def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
     """Legendre's necessary condition for a minimum: meridional stress and modulus are positive everywhere.
 
-    The eigenvalues of F_y'y'/r are W_11 along the meridian and W_1/lambda_1 across it.
+    The eigenvalues of F_y'y'/r are W_11 along the meridian and W_1/lambda_1 across it (paper eq. 40).
+
+    Parameters
+    ----------
+    equilibrium : Equilibrium
+
+    Returns
+    -------
+    LegendreTest
     """
     potential = equilibrium.potential
     space = potential.space
@@ -107,16 +115,20 @@ def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
 
 @one_thread
 def jacobi_test(equilibrium: Equilibrium, form: str = "corrected", *, start: float = 1e-4) -> JacobiTest:
-    """Jacobi's condition for a minimum under pressure control.
+    """Jacobi's condition for a minimum under pressure control (paper eqs. 42-45).
 
     Parameters
     ----------
     equilibrium : Equilibrium
-        On a disc, of any degree; below degree 6 the state is first solved again on elements of degree 8, whose slopes are smooth.
-        Where a tension field is wrinkled the coefficients jump inside elements, and conjugate points are good to three digits.
+        Of a disc. Below degree 6 the state is first solved again on elements of degree 8, whose slopes are smooth. In a wrinkled tension
+        field the coefficients jump inside elements, and conjugate points are good to three digits.
     form : {"corrected", "printed"}
     start : float
         Radius at which the integration starts.
+
+    Returns
+    -------
+    JacobiTest
 
     Raises
     ------
@@ -145,7 +157,7 @@ def _smooth(equilibrium: Equilibrium) -> tuple[Potential, Array, float]:
         return old, equilibrium.state, equilibrium.pressure
     potential = potential_of(scene.replace(mesh=disc(_SMOOTH_ELEMENTS), degree=_SMOOTH_DEGREE))
     volume, pressure, height = equilibrium.volume, equilibrium.pressure, equilibrium.center_height
-    # at a fold in one quantity another one still tells neighbouring equilibria apart
+    # at a fold in one quantity another quantity still tells neighbouring equilibria apart
     for control in (CenterHeightControl(height), VolumeControl(volume), PressureControl(pressure)):
         result = solved_in(potential, control, old, equilibrium.state, pressure)
         if result.status is Status.CONVERGED:

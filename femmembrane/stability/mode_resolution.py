@@ -1,11 +1,12 @@
 """How far the mode of an eigenvalue is resolved by the mesh, read off the integrand of its Rayleigh quotient.
 
-Per element the integrand phi . K phi is known at the Gauss points. Its part along the highest polynomial that these points tell apart,
-P_p for p + 1 points, is what elements of degree p cannot be trusted with: of order h^p where state and mode are smooth, beside errors of
-order h^(2 p) of the eigenvalue, and as large as the integrand itself in an element in which a needle or a layer is hidden. The same part of
-the stresses says how far the state is from that of the continuum, where the mode itself is small as well. An eigenvalue that exceeds twice
-the sum has the sign of the continuum's in all cases measured. It is an indicator and no bound: on meshes that resolve the state errors are
-far below the sum, on those that miss a needle an eigenvalue may be off by many times it, to the side of its own sign in those measured.
+Per element the integrand phi . K phi is known at the Gauss points. The highest polynomial that p + 1 points tell apart is P_p. The part of
+the integrand along P_p is what elements of degree p cannot be trusted with. Where state and mode are smooth it is of order h^p, beside
+errors of order h^(2 p) of the eigenvalue. In an element that hides a needle or a layer it is as large as the integrand itself. The same
+part of the stresses says how far the state is from the state of the continuum, where the mode itself is small as well. An eigenvalue that
+exceeds twice the sum has the sign of the continuum's in all cases measured. It is an indicator and no bound. On meshes that resolve the
+state, errors are far below the sum. On meshes that miss a needle an eigenvalue may be off by many times the sum; in all cases measured the
+error was to the side of its own sign.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from ..discretization.space import HESSIAN_PAIRS, Space
 from ..potential import Array, Evaluation
 
-#: an eigenvalue is small below this part of that of a membrane of the same area under a tension of one shear modulus, or so
+#: an eigenvalue is small below this part of a typical one: about the eigenvalue of a membrane of the same area under a tension of one shear
+#: modulus
 _SMALL = 1e-2
 
 
@@ -51,7 +53,7 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
 
 
 def _of_state(space: Space, stress: Array) -> float:
-    """Relative part of the stresses of a state that the mesh does not resolve: errors of pressure and of moduli are below it."""
+    """Relative part of the stresses of a state that the mesh does not resolve. Errors of the pressure and of moduli are smaller."""
     integrand = (stress[0] + stress[1]).reshape(space.R.shape)
     integrand *= space.area_weights
     size = _size(integrand)

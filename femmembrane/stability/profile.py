@@ -1,4 +1,4 @@
-"""Where the points of a meridian lie in a state of the membrane, how they are stretched and what they carry."""
+"""Positions, stretches and stresses of the points of a meridian in a state of the membrane."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     )  # a recovered slope overshoots where a few elements hold a drawn-out pole
     e1 = meridional_strain(R_s, Z_s, u_s, w_s)
     hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
-    e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # between its quadrature points a mesh may be too coarse for a positive radius
+    e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
     rho, eta = R + u, Z + w
     mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
     h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)

@@ -1,7 +1,7 @@
-"""Eigenvalues of a membrane that can move as a whole: those of the motions that are left when rigid ones are taken out.
+"""Eigenvalues of a membrane that can move as a whole. They belong to the motions that are left when rigid motions are taken out.
 
-With T the rigid motions, K T = 0, the others are orthogonal to T in the mass M. The unknowns hold one node so that K is regular; a motion y
-of theirs stands for y less its rigid part, y - T (T^T M T)^-1 T^T M y, which has the same K and the mass::
+With T the rigid motions, K T = 0, the others are orthogonal to T in the mass M. The unknowns hold one node, so that K is regular. A motion
+y in these unknowns stands for y without its rigid part, y - T (T^T M T)^-1 T^T M y. It has the same K and the mass::
 
     M' = M - U U^T,        U = M T (T^T M T)^(-1/2)
 

@@ -222,7 +222,9 @@ def _volume_density(space: Space, r: LocalResponse, work: Array, n: int) -> dict
 
 
 def _projected_density(r: LocalResponse, g: Array, g_z: Array, n: int) -> dict[tuple[int, int], Array]:
-    """Second derivatives of an energy g(eta) over the projected area, but for those of g', from weighted g and g' at the points."""
+    """Second derivatives of an energy g(eta) over the projected area, from weighted g and g' at the points; the terms with g'' are left
+    out.
+    """
     return {
         (_A, _AX): g,
         (_A, _CX): n * g,

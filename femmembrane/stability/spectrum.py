@@ -3,9 +3,9 @@
 lambda is a squared natural frequency: it converges under refinement, as raw Hessian eigenvalues do not. Under volume control only
 perturbations with V' . phi = 0 compete.
 
-Rayleigh quotient iteration on banded factors, started from a neighbouring state's mode where there is one, costs a few factorisations;
-what it finds is accepted only with a proof by inertia that nothing lies below. Without that proof Lanczos iterations from a certified
-lower bound decide.
+Rayleigh quotient iteration on banded factors costs a few factorisations; it starts from the mode of a neighbouring state if there is one.
+Its answer is accepted only with a proof by inertia that nothing lies below. Without that proof Lanczos iterations from a certified lower
+bound decide.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def lowest_of(pencil: Pencil, count: int) -> list[tuple[float, Array, float]]:
     """
     for width in (max(2 * count + 1, 20), max(4 * count + 1, 60)):
         found = pencil.lanczos(count, min(width, pencil.n))
-        # all that lies clearly below the last one must have been found
+        # all eigenvalues clearly below the last one must have been found
         shift = found[-1][0] - max(1e-6 * abs(found[-1][0]), 1e-12 * pencil.scale)
         if pencil.count(shift) == sum(value < shift for value, _, _ in found):
             return found
@@ -121,7 +121,8 @@ class Pencil:
         return float(np.abs(self.band[2 * self.kd] / self.mass[2 * self.kd]).max())
 
     def noise(self, mode: Array) -> tuple[float, float]:
-        """What cancels in the Rayleigh quotient of a normalised mode and in the size of its residual; times round-off, their noise.
+        """Sizes of the terms that cancel in the Rayleigh quotient of a normalised mode and in its residual. Times round-off they are the
+        noise of both.
 
         On a strongly graded mesh both are many decades below the scale, which belongs to waves as short as the smallest element.
         """
@@ -193,7 +194,7 @@ class Pencil:
             mode, right = self.normalised(mode)
             value, error = self.quotient(mode, right)
             # an absolute floor alone would stop too early on a nearly flat membrane, whose modes are decades softer than the scale
-            # the error of the value is of second order in that of the mode
+            # the error of the value is of second order in the error of the mode
             if error <= tolerances.converged * abs(value) or (
                 error > tolerances.shrinking * best and error <= tolerances.rounding * self.noise(mode)[1]
             ):
@@ -225,8 +226,8 @@ class Pencil:
         return value, float(np.sqrt(np.sum(residual**2 / self.mass[2 * self.kd])))
 
     def below(self, value: float, mode: Array) -> int:
-        """Number of eigenvalues clearly below that of a mode, by inertia."""
-        # the flat unloaded disc has no stiffness to cancel: there it takes a shift of any size to tell zero from negative
+        """Number of eigenvalues clearly below the eigenvalue of a mode, by inertia."""
+        # the flat unloaded disc has no stiffness that could cancel: any shift tells its zeros from negative eigenvalues
         t = _TOLERANCES
         shift = value - max(t.gap * abs(value), t.noise * self.noise(mode)[0], t.floor * self.scale)
         return self.count(shift)

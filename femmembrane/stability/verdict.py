@@ -48,13 +48,13 @@ def axisymmetric_verdict(
         pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid), guess
     )
     shape = partial(mode_shape, potential.space)
-    # compression that is the mesh's alone says that the mesh is not to be trusted
+    # compression that finer meshes do not confirm says that the mesh cannot be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
     return verdict_from(found, against(control, 0), control, 0, shape, unresolved)
 
 
 def short_wave_verdict(where: str, confirmed: bool, control: str | None, n: int) -> Verdict:
-    """The verdict where ever shorter waves have ever lower eigenvalues, or may have: a mesh alone that shows it leaves it open."""
+    """The verdict where shorter and shorter waves have lower and lower eigenvalues. It is open if only the scene's own mesh shows this."""
     wrinkling = " (wrinkling)" if n else ""
     kind = f"short-wave unstable{wrinkling}" if confirmed else "not confirmed: short-wave unstable if the membrane is as this mesh shows it"
     return Verdict(False if confirmed else None, np.nan, np.nan, control, n, None, f"{kind}: {where}")
@@ -69,7 +69,7 @@ def against(control: str | None, n: int) -> str:
 
 
 def verdict_from(found: SmallestEigenvalue, among: str, control: str | None, n: int, shape: Shape, unresolved: float) -> Verdict:
-    """The verdict that a smallest eigenvalue means for a class of perturbations, named in words."""
+    """The verdict that follows from a smallest eigenvalue, for a class of perturbations named in words."""
     stable = None if abs(found.value) <= found.error else found.value > 0
     if stable is None:
         reason = f"marginal: the smallest eigenvalue among {among} is zero within {found.error:.1g}"

@@ -20,7 +20,7 @@ RADIAL, AROUND, VERTICAL = range(3)
 
 
 class WaveUnknowns:
-    """What depends on the space and on min(n, 2) alone: supports, numbering, tables, mass."""
+    """Supports, numbering, tables and mass: they depend on the space and on min(n, 2) alone."""
 
     def __init__(self, space: Space, kind: int) -> None:
         degree, n_elements = space.degree, space.n_elements
@@ -98,9 +98,9 @@ def wave_unknowns(space: Space, kind: int) -> WaveUnknowns:
 def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
     """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
 
-    What a clamp holds of u it holds of both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
-    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no
-    perturbations: one node is held against them, which takes none of the others away.
+    A support that holds u holds both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
+    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no perturbations.
+    One node is held against them, and no other motion is lost.
     """
     free = np.ones((space.n_nodes, 3), dtype=bool)
     opposite = []

@@ -13,7 +13,7 @@ field the mechanical stress across wrinkles is exactly zero; there the strain be
 
     g_1 = e_1 + max(e_2, 0)/2,      g_2 = e_2 + max(e_1, 0)/2
 
-which vanishes where the membrane stops being taut, as the stress of the plain material does.
+It vanishes where the membrane stops being taut, as the stress of the plain material does.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from .profile import Profile, profile_at
 
 Array = NDArray[np.float64]
 
-#: what compressive s_11 and s_22 add to the number of a kind
+#: numbers that a compressive s_11 and a compressive s_22 add to the number of a kind
 _BITS = (2, 1)
 #: points at which the signs are looked at in each element, both ends included
 _SAMPLES = 13
 #: rounds of dividing an interval with a root, and parts each time; what is left is shorter than _SLIVER
 _ROUNDS, _PARTS = 5, 32
-#: ends of elements within a zone from which on it is the membrane's without a further look
+#: number of ends of elements within a zone from which on it is believed without a finer mesh
 _WIDE = 4
 #: zones shorter than this part of the meridian are round-off of a border
 _SLIVER = 1e-10
 
-#: how often the way between two equilibria is halved to see where the kinds of zones change
+#: how often the line between two equilibria is halved to find where the kinds of zones change
 _HALVINGS = 10
 
 #: parameters of the meridian to the two stresses whose signs decide
@@ -108,7 +108,9 @@ def zones_along(branch: Branch) -> ZonesAlong:
 def _changing(
     a: Equilibrium, b: Equilibrium, first: tuple[float, Zones], last: tuple[float, Zones], halvings: int
 ) -> list[tuple[float, Zones]]:
-    """Zones of states on the straight line from a to b, closer and closer to where their kinds change; each with its part of the way."""
+    """Zones of states on the straight line from a to b, closer and closer to where the kinds change; each with its place on the line, from
+    0 to 1.
+    """
     if first[1].kinds == last[1].kinds or not halvings:
         return []
     t = (first[0] + last[0]) / 2
@@ -133,7 +135,7 @@ class _Check:
         self.ends = space_of_scene(scene).ends
 
     def kept(self, codes: list[int], edges: Array) -> tuple[list[int], Array]:
-        """The zones less those stresses whose compression ends within a few elements and is gone in a finer space."""
+        """The zones without compressions that end within a few elements and are gone in a finer space."""
         codes = list(codes)
         for bit in _BITS:
             for first, last in _runs([bool(code & bit) for code in codes]):
@@ -204,13 +206,13 @@ def _changes(s: Array, compressive: NDArray[np.bool_], deciding: _Stresses) -> l
 def _roots(deciding: _Stresses, which: NDArray[np.int64], a: Array, b: Array, negative: NDArray[np.bool_]) -> Array:
     """Roots of the stresses ``which`` between a and b, ``negative`` telling their signs at a.
 
-    One point at a time costs as much as hundreds at once: so all intervals are narrowed together, and the last step is a secant.
+    A single point costs as much as hundreds at once. So all intervals are narrowed together, and the last step is a secant.
     """
     column = np.arange(a.size)
     for _ in range(_ROUNDS):
         s = np.linspace(a, b, _PARTS + 1)
         values = np.stack(deciding(s.ravel())).reshape(2, *s.shape)[which, :, column].T
-        # the signs at a and b are known: evaluated again, a zero there may come out with the other one
+        # the signs at a and b are known: evaluated again, a zero there may come out with the opposite sign
         other = (values[1:] < 0) != negative
         other[-1] = True
         k = np.argmax(other, axis=0)

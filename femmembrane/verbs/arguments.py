@@ -14,7 +14,7 @@ ILL_POSED = ("stop", "mark")
 
 
 def check_scene(scene: Any) -> None:
-    """Raise InputError for what is no scene, such as the path of its file."""
+    """Raise InputError unless the argument is a scene; the path of a scene file is none."""
     if not isinstance(scene, Scene):
         raise InputError("scene", scene, "a Scene is allowed; Scene.from_toml reads one from a file")
 
@@ -25,7 +25,7 @@ def check_max_steps(max_steps: Any) -> None:
 
 
 def check_ill_posed(ill_posed: Any) -> None:
-    """Raise InputError unless what to do in compression is known."""
+    """Raise InputError unless ``ill_posed`` is a known word."""
     choice("ill_posed", ill_posed, ILL_POSED)
 
 

@@ -44,8 +44,8 @@ def convergence(
 ) -> Convergence:
     """How fast an equilibrium converges with the degree and the number of elements, and how well it is known.
 
-    The equilibrium is the one that :func:`equilibrium` finds on the scene's own mesh, stable or not. From there it is solved on a
-    reference (32 elements of degree 8, or half the most that are asked for) and then on every mesh, all graded like the scene's.
+    :func:`equilibrium` finds the equilibrium on the scene's own mesh, stable or not. From there it is solved on a reference mesh of degree
+    8 (32 elements, or half the largest number that is asked for) and then on every mesh. All meshes are graded like the scene's own.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def convergence(
     volume, pressure, center_height : float
         Exactly one of them.
     degrees : sequence of int
-        1 to 8.
+        Increasing, from 1 to 8.
     elements : sequence of int
         Increasing.
     start : Equilibrium, optional
-        Of this scene, to start from.
+        An equilibrium of this scene to start from.
     limit_points : bool
-        Compare the pressure and volume of the first limit point between V = 0.5 and the equilibrium as well.
+        Whether to compare the first limit point between the moderately inflated membrane and the equilibrium as well.
 
     Returns
     -------
@@ -68,8 +68,17 @@ def convergence(
     Raises
     ------
     InputError, SolveError
-        The latter when the equilibrium cannot be found on the scene's own mesh or on the reference; a mesh of the study on which it cannot
-        be found is a line in ``messages`` and NaN in the tables.
+        SolveError when the equilibrium cannot be found on the scene's own mesh or on the reference. Any other mesh on which it cannot be
+        found is a line in ``messages`` and NaN in the tables.
+
+    Examples
+    --------
+    The pressure converges at order 2 with linear elements, and at order 4 with quadratic ones:
+
+    >>> import femmembrane as fm
+    >>> study = fm.convergence(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volume=1.0, degrees=(1, 2), elements=(8, 16))
+    >>> [round(float(order), 1) for order in study.orders("pressure")[:, -1]]
+    [2.0, 4.0]
     """
     check_scene(scene)
     degrees = check_increasing("degrees", degrees, MAX_DEGREE)
@@ -189,7 +198,7 @@ class _Study:
     def _floors(
         self, fine: Equilibrium, others: Sequence[Equilibrium], reference: dict[str, float]
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """What errors are relative to, and the error of the reference in that measure."""
+        """Divisors of relative errors, and the error of the reference over the same divisors."""
         scale: dict[str, float] = {}
         floors: dict[str, float] = {}
         measured = [self.measured(eq) for eq in others]

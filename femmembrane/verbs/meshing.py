@@ -1,4 +1,4 @@
-"""The mesh of a scene that names an accuracy instead: chosen before anything is computed."""
+"""The mesh of a scene that names an accuracy in place of elements. It is chosen before anything else is computed."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ from .arguments import check_scene
 if TYPE_CHECKING:
     from ..accuracy.adapt import Shortfall
 
-#: what is wanted, or a part of it, from a scene with a mesh and a start on it
+#: from a scene with a mesh, and a start on it, to the branch that is wanted, or a part of it
 FollowFrom = Callable[[Scene, Equilibrium | None], Branch]
 
 
 def on_chosen_mesh(
     scene: Scene, start: Equilibrium | None, follow: FollowFrom, control: str
 ) -> tuple[Scene, Equilibrium | None, dict[str, float], Shortfall | None]:
-    """The scene with a mesh, the start on that mesh, the seconds that the choice took, and where ``follow`` leaves the accuracy on it.
-
-    All is as it is unless the mesh is still to be chosen.
+    """The scene with a mesh, the start on that mesh, the seconds that the choice took, and where ``follow`` leaves the accuracy on it. A
+    scene whose mesh is not open is returned as it is.
 
     Raises
     ------
@@ -48,7 +47,7 @@ def on_chosen_mesh(
 
 
 def _carried(start: Equilibrium | None, scene: Scene) -> Equilibrium | None:
-    """A start on another mesh, as a guess: whoever resumes it solves again."""
+    """A start on another mesh, as a guess: it is solved again when it is resumed."""
     if not isinstance(start, Equilibrium):
         return start
     state = transferred(start.potential.space, start.state, potential_of(scene).space)

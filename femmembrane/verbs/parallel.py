@@ -1,7 +1,7 @@
 """Many scenes at once: in this process, on this machine's cores, or on a Dask cluster.
 
-Each way takes the tasks one by one as there is room for them, and yields their rows as they are done, in any order. Processes compute a
-scene alone and know nothing of the others, so that rows do not depend on who computed them, or when.
+Each way takes the tasks one by one as there is room for them, and yields their rows as they are done, in any order. Every scene is computed
+on its own, so that its row does not depend on the process or the time.
 """
 
 from __future__ import annotations
@@ -44,9 +44,8 @@ def here(tasks: Iterator[Task]) -> Iterator[tuple[str, Row]]:
 
 
 def on_cores(tasks: Iterator[Task], workers: int) -> Iterator[tuple[str, Row]]:
-    """In processes of this machine.
-
-    When one dies, the scenes that were under way are tried again one by one: one whose process dies again has a row that says so.
+    """In processes of this machine. When a process dies, the scenes that were under way are tried again one by one. A scene whose process
+    dies again has a row that says so.
 
     Raises
     ------
@@ -66,7 +65,7 @@ def on_cores(tasks: Iterator[Task], workers: int) -> Iterator[tuple[str, Row]]:
 
 
 def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]:
-    """On the workers of a Dask cluster, whose scheduler sees to it that scenes of lost workers are computed by others.
+    """On the workers of a Dask cluster. Its scheduler hands the scenes of lost workers to others.
 
     Raises
     ------
@@ -90,9 +89,7 @@ def on_cluster(tasks: Iterator[Task], address: str) -> Iterator[tuple[str, Row]]
         except ImportError as error:
             raise InputError("scheduler", address, f"its workers need femmembrane {_version()} ({error})") from None
         if found != {_version()}:
-            allowed = (
-                f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, or rows would hang on who computes them"
-            )
+            allowed = f"its workers have femmembrane {'; '.join(sorted(found))}: all need {_version()}, so that all compute the same rows"
             raise InputError("scheduler", address, allowed)
         with client.get_executor(pure=False) as executor:
             yield from _drive(executor, tasks, {}, lambda: max(16, 4 * sum(client.nthreads().values())))
@@ -111,7 +108,7 @@ def _processes(workers: int) -> Iterator[Executor]:
 
 
 def _begin() -> None:
-    """In a new process: Ctrl-C ends it without a word, and it does not outlive its parent, however that ends."""
+    """Set up a new process: Ctrl-C ends it without a word, and it ends with its parent, even if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
     if parent is not None:
@@ -124,7 +121,7 @@ def _follow(parent: BaseProcess) -> None:
 
 
 def _try_out(executor: Executor, workers: int) -> None:
-    """One trivial call, so that processes that cannot start are not taken for a fault of the scenes."""
+    """Make one trivial call, so that processes that cannot start are not taken for a fault of the scenes."""
     try:
         executor.submit(os.getpid).result(_PATIENCE)
     except BrokenProcessPool:
@@ -133,7 +130,7 @@ def _try_out(executor: Executor, workers: int) -> None:
 
 
 def _version() -> str:
-    """The version, and what else decides the last bits: which half computes, with which NumPy and SciPy, on what kind of processor."""
+    """All that decides the last bits: the version, the half that computes, NumPy, SciPy and the kind of processor."""
     import platform
 
     import scipy
@@ -146,7 +143,7 @@ def _version() -> str:
 
 
 def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task], room: Callable[[], int]) -> Iterator[tuple[str, Row]]:
-    """Keep an executor busy with no more tasks than there is room for; ``under_way`` holds what has not come back."""
+    """Keep an executor busy with no more tasks than there is room for. ``under_way`` holds the tasks that have not come back."""
     futures: dict[Future[Row], str] = {}
     for task in tasks:
         key, scene, quantity, options = task
@@ -164,7 +161,7 @@ def _finished(futures: dict[Future[Row], str], under_way: dict[str, Task]) -> It
             row = future.result()
         except BrokenProcessPool:
             raise
-        except Exception as error:  # a cluster gives up on a scene that workers died of
+        except Exception as error:  # a cluster gives up a scene that killed several workers
             row = Row(UNEXPECTED, f"{type(error).__name__}: {error}", {})
         key = futures.pop(future)
         under_way.pop(key)
@@ -172,7 +169,7 @@ def _finished(futures: dict[Future[Row], str], under_way: dict[str, Task]) -> It
 
 
 def _one_by_one(left: list[Task]) -> Iterator[tuple[str, Row]]:
-    """Suspects: in one process, and in another one whenever that dies."""
+    """Suspicious scenes, one by one in a process of their own; a new one is started whenever it dies."""
     while left:
         try:
             with _processes(1) as executor:

@@ -18,14 +18,14 @@ from .follow import equilibrium, run
 from .search import equilibria
 from .trace import trace
 
-#: in the message of a row, and in its status, when a scene fails for a reason that is not its own: it is not kept, but tried again
+#: message and status of a row when a scene fails for a reason outside of it; such a row is not kept, and the scene is tried again
 UNEXPECTED = "unexpected error"
 #: reference radii at which the smallest stress is looked for
 _RADII = np.linspace(0.0, 1.0, 401)
-#: steps of a trace after which it is asked whether it has met what it is followed for
+#: steps of a trace between two looks at whether it has met what is sought
 _PIECE = 20
 
-#: how the onset of an instability went, beside the numbers of it
+#: how the onset of an instability was found, beside its numbers
 ONSET, NEVER, ALWAYS = "onset", "never on this branch", "from the start"
 
 Values = dict[str, Any]
@@ -85,7 +85,7 @@ def compute(scene: Scene, quantity: str, options: Options) -> Row:
 
 
 def check(scene: Scene, quantity: str, options: Options) -> None:
-    """Raise InputError for a quantity that is unknown, or that this scene with these options has not."""
+    """Raise InputError for an unknown quantity, and for one that this scene with these options does not have."""
     choice("quantity", quantity, QUANTITIES)
     given = {name: value for name, value in (("pressure", options.pressure), ("volume", options.volume)) if value is not None}
     if quantity == "equilibria":
@@ -94,7 +94,7 @@ def check(scene: Scene, quantity: str, options: Options) -> None:
         ((name, load),) = given.items()
         number(name, load)
     elif given:
-        raise InputError(*next(iter(given.items())), 'only quantity = "equilibria" takes a load; others take that of [run]')
+        raise InputError(*next(iter(given.items())), 'only quantity = "equilibria" takes a load; all others take the load of [run]')
     traced = quantity in TRACED
     if options.direction not in (1, -1) or (options.direction != 1 and not traced):
         raise InputError("direction", options.direction, f"1, or for {', '.join(TRACED)} -1 (towards smaller volumes) is allowed")
@@ -113,7 +113,7 @@ def _branch(scene: Scene, options: Options) -> Row:
 
 
 def _traced(scene: Scene, options: Options, special_points: bool = True, ended: Callable[[Branch], bool] | None = None) -> Branch:
-    """The branch that [run] asks for; with ``ended`` only as far as that says, in pieces that change nothing of it."""
+    """The branch that [run] asks for, followed in pieces. It is the same as in one piece, but ends early where ``ended`` says so."""
     asked = scene.run
     if asked is None:
         raise InputError("run", None, "missing")
@@ -193,7 +193,7 @@ def _wrinkling(scene: Scene, options: Options) -> Row:
 
 
 def _told(branch: Branch, values: Values, found: bool) -> Row:
-    """A row whose question was answered before the branch ended, or else with the end of the branch."""
+    """The row of an answer; without an answer it says how the branch ended."""
     return Row(str(Status.CONVERGED), "", values) if found else Row(str(branch.status), branch.message, values)
 
 
@@ -203,7 +203,9 @@ def _smallest_stress(eq: Equilibrium, criterion: str) -> float:
 
 
 def _where_compressed(scene: Scene, before: Equilibrium, after: Equilibrium, criterion: str) -> Equilibrium:
-    """The equilibrium between two neighbours at which the smallest stress is zero, by pole height, or by volume where that turns."""
+    """The equilibrium between two neighbours at which the smallest stress is zero. It is sought by pole height, or by volume where the
+    height turns back.
+    """
     plain = scene.replace(run=None)
     last: SolveError | None = None
     for name in ("center_height", "volume"):
@@ -241,5 +243,5 @@ QUANTITIES: Mapping[str, Compute] = {
     "tipping": _tipping,
     "wrinkling": _wrinkling,
 }
-#: those that follow a branch by arc length
+#: quantities that follow a branch by arc length
 TRACED = ("branch", "tipping", "wrinkling")

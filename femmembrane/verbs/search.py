@@ -18,9 +18,9 @@ from .state_records import record
 def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | None = None, max_steps: int = 400) -> Equilibria:
     """All equilibria at a pressure or at a volume that can be found, stable or not.
 
-    Branches through several inflated and deflated starts are traced both ways and cut at the load, and so is the other branch at every
-    branch point met on the way, each once; Newton's method with the states found deflated then looks for branches that are not connected
-    to them.
+    Branches through several inflated and deflated starts are traced both ways and cut at the load. At every branch point on the way the
+    crossing branch is traced too, each once. Newton's method with deflation of the states found then looks for branches that are not
+    connected to these.
 
     Parameters
     ----------
@@ -29,6 +29,10 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
         Exactly one of them.
     max_steps : int
         Most steps in each direction along a branch.
+
+    Returns
+    -------
+    Equilibria
 
     Raises
     ------

@@ -25,7 +25,7 @@ OnCheckpoint = Callable[[Branch], None]
 
 
 def resume(potential: Potential, start: Equilibrium) -> State:
-    """The solver's state of a recorded equilibrium, of this scene or of one with the same mesh and degree."""
+    """The solver's state of a recorded equilibrium, of this scene or of another scene with the same mesh and degree."""
     if not isinstance(start, Equilibrium):
         raise InputError("start", start, "an Equilibrium is allowed")
     if start.state.shape != (potential.space.n_free,):
@@ -106,7 +106,7 @@ def record(
 
 
 def special_point(scene: Scene, potential: Potential, located: Located, azimuthal: int = 0) -> SpecialPoint:
-    """The public record of a located point; of a branch point with the direction of its branch, from which another can be told."""
+    """The public record of a located point. A branch point has the direction of its branch, which tells it from the crossing branch."""
     point, eq = located.point, record(scene, potential, located.point.state)
     tangent = np.append(point.tangent, point.tangent_pressure) if located.kind == "branch_point" else None
     return SpecialPoint(located.kind, eq.volume, eq.pressure, eq.center_height, located.error, eq, azimuthal=azimuthal, tangent=tangent)

@@ -32,11 +32,11 @@ from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
 if TYPE_CHECKING:
     pass
 
-#: called with the number of scenes that are done, all there are, and those of the done ones without a result
+#: called with the number of scenes that are done, the number of all scenes, and the number of done scenes without a result
 OnScene = Callable[[int, int, int], None]
-#: where finished scenes are kept in the folder of a sweep
+#: name of the file with the finished scenes, in the folder of a sweep
 KEPT = "scenes.sqlite"
-#: seconds for which a sweep gets on alone, about what it takes to start processes
+#: seconds for which a sweep works in one process, about as long as it takes to start others
 _ALONE = 2.0
 #: scenes that are timed for an estimate
 _SAMPLE = 4
@@ -57,8 +57,8 @@ def sweep(
 ) -> Sweep:
     """Compute one quantity of every scene of a grid.
 
-    All scenes are checked before the first is computed. Each is computed on its own, from a cold start, so that its row is the same to the
-    last bit whoever computes it; a scene that fails is a row with its reason.
+    All scenes are checked before the first is computed. Each is computed on its own, from a cold start: its row is the same to the last bit
+    in any process. A scene that fails is a row with its reason.
 
     Parameters
     ----------
@@ -66,21 +66,22 @@ def sweep(
     over : mapping of str to values
         Keys as in a scene file, such as ``source.0.strength`` or ``mesh.elements``, and the values each takes: numbers, booleans or texts.
     quantity : {"branch", "run", "equilibria", "tipping", "wrinkling"}
-        A branch by arc length with its special points; what [run] says; all equilibria at a pressure or volume; where along the branch
-        stability against one wave around the axis is first lost or regained; where its stresses (``analysis.wrinkling``, or the
-        mechanical ones) first become compressive. All but equilibria follow the scene's [run].
+        "branch": a branch by arc length with its special points. "run": what [run] says. "equilibria": all equilibria at a pressure or
+        volume. "tipping": where along the branch stability against one wave around the axis is first lost or regained. "wrinkling": where
+        the stresses first become compressive (``analysis.wrinkling`` says which; default the mechanical ones). All but "equilibria" follow
+        the scene's [run].
     pressure, volume : float, optional
-        For equilibria: exactly one of them.
+        For "equilibria": exactly one of them.
     direction : {1, -1}
-        For branch, tipping and wrinkling: whether to set out to larger or smaller volumes.
+        For "branch", "tipping" and "wrinkling": whether to set out to larger or smaller volumes.
     workers : int, optional
-        Processes on this machine, 1 stays in this one. Default: one a core, started only for what is left after the first two seconds.
+        Processes on this machine; 1 stays in this process. Default: one a core, started only for what is left after the first two seconds.
         With more than one, a script must call this below ``if __name__ == "__main__":``.
     scheduler : str, optional
         Address of a running Dask scheduler (``tcp://...``) whose workers compute, in place of this machine.
     out : path, optional
-        Folder in which finished scenes are kept: they are not computed again, by this sweep or another one, so that an interrupted sweep
-        goes on where it was.
+        Folder in which finished scenes are kept. No sweep with this folder computes them again, so that an interrupted sweep goes on where
+        it was.
     on_scene : callable, optional
         Called with (done, all, failed) after each scene.
 
@@ -91,7 +92,18 @@ def sweep(
     Raises
     ------
     InputError
-        For a key that the scenes do not have, for a value that one of them refuses, and for what cannot be used of the rest.
+        For a key that the scenes do not have, for a value that a scene refuses, and for any other argument that cannot be used.
+
+    Examples
+    --------
+    The pressure at the limit point of two Mooney-Rivlin discs:
+
+    >>> import femmembrane as fm
+    >>> run = fm.Run(control="arc-length", start=0.5, until={"volume": 10.0})
+    >>> scene = fm.Scene(material=fm.MooneyRivlin(0.01), mesh=fm.disc(8), run=run)
+    >>> found = fm.sweep(scene, {"material.ratio": [0.01, 0.05]}, workers=1)
+    >>> [round(float(p), 4) for p in found.to_xarray()["limit_pressure"][:, 0]]
+    [1.9265, 2.1605]
     """
     grid = _Grid.of(scene, over, quantity, Options(pressure, volume, direction))
     workers = _workers(workers, scheduler)
@@ -131,6 +143,19 @@ def plan_sweep(
 ) -> Plan:
     """Count the scenes of a :func:`sweep` and time a few of them, spread over the grid, in this process.
 
+    Parameters
+    ----------
+    scene : Scene
+    over : mapping of str to values
+        As in :func:`sweep`.
+    quantity, pressure, volume, direction, workers, out
+        As in :func:`sweep`.
+
+    Returns
+    -------
+    Plan
+        Counts and expected seconds; ``print`` shows them.
+
     Raises
     ------
     InputError
@@ -142,7 +167,7 @@ def plan_sweep(
         kept = stack.enter_context(FinishedScenes(Path(out) / KEPT)) if out is not None and (Path(out) / KEPT).exists() else None
         known = set(_known(grid, kept))
         left = [key for key in grid.distinct if key not in known]
-        # in the middle of equal parts: corners are where a grid is at its strangest
+        # scenes in the middle of equal parts of the grid: its corners are its least typical scenes
         chosen = {left[(2 * k + 1) * len(left) // (2 * _SAMPLE)] for k in range(_SAMPLE)} if left else set()
         seconds = 0.0
         for key, changed, _, options in grid.tasks(set(grid.distinct) - chosen):
@@ -154,7 +179,7 @@ def plan_sweep(
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """All scenes of a sweep, by their keys alone: a scene is made when its turn comes."""
+    """All scenes of a sweep. It holds their keys alone: a scene is made when its turn comes."""
 
     tables: Mapping[str, Any]
     over: Mapping[str, tuple[Any, ...]]
@@ -217,11 +242,11 @@ def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
 
 
 def _key(scene: Scene, quantity: str, options: Options) -> str:
-    """The hash of all that a row depends on; a title is not part of it."""
+    """The hash of everything that a row depends on. The title plays no part."""
     from .. import __version__
 
     tables = {name: table for name, table in scene.to_dict().items() if name != "title"}
-    # rows of membranes with their inside above were kept with other signs before
+    # earlier versions kept rows of membranes with their inside above with other signs
     signs = ["inside above"] if side(scene.mesh) < 0 else []
     text = json.dumps([_canonical(tables), quantity, _canonical(asdict(options)), __version__, *signs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -250,7 +275,10 @@ def _workers(workers: Any, scheduler: Any) -> int | None:
 
 
 def _computed(tasks: Iterator[parallel.Task], workers: int | None, scheduler: str | None) -> Iterator[tuple[str, Row]]:
-    """The rows of tasks by whoever is to compute them; unless told, processes are started for what is left after ``_ALONE`` seconds."""
+    """The rows of tasks, from a cluster, from processes or from this process.
+
+    Without orders this process begins, and processes are started for what is left after ``_ALONE`` seconds.
+    """
     if scheduler is not None:
         yield from parallel.on_cluster(tasks, scheduler)
     elif workers is None and parallel.cores() > 1:
@@ -268,7 +296,7 @@ def _computed(tasks: Iterator[parallel.Task], workers: int | None, scheduler: st
 
 
 def _known(grid: _Grid, kept: FinishedScenes | None) -> dict[str, Row]:
-    """The rows that are kept; what is no whole row is none, and computed again."""
+    """The rows that are kept. An incomplete row does not count, and its scene is computed again."""
     found = {} if kept is None else {key: _row(kept.get(key)) for key in grid.distinct}
     return {key: row for key, row in found.items() if row is not None}
 
@@ -280,7 +308,7 @@ def _row(kept: Mapping[str, Any] | None) -> Row | None:
 
 
 def _keep(kept: FinishedScenes | None, key: str, row: Row) -> None:
-    if kept is not None and row.status != UNEXPECTED:  # which may well go better another time
+    if kept is not None and row.status != UNEXPECTED:  # a scene that failed unexpectedly may succeed another time
         kept.put(key, asdict(row))
 
 

@@ -1,4 +1,4 @@
-"""Matplotlib without windows: what the package asks of it, whatever the surroundings say."""
+"""Matplotlib without windows, in any surroundings."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _TITLE = 120
 
 
 def load() -> None:
-    """Import Matplotlib, also where ``MPLBACKEND`` names a backend that is not there.
+    """Import Matplotlib, also where ``MPLBACKEND`` names a backend that does not exist.
 
-    A notebook hands its backend on to every process that it starts, and Matplotlib refuses to be imported when it cannot find that. Figures
-    of this package are drawn to files, for which no backend is needed.
+    A notebook hands its backend on to every process that it starts. Matplotlib refuses to be imported when it cannot find this backend.
+    Figures of this package are drawn to files, for which no backend is needed.
     """
     try:
         importlib.import_module("matplotlib")

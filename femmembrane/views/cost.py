@@ -31,7 +31,8 @@ _DARK = "#222222"
 
 
 def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
-    """Relative error against wall time of one equilibrium, one panel for each kind of start; what nothing beats is joined by a broad line.
+    """Relative error against wall time of one equilibrium, one panel for each kind of start. A broad line joins the solves that no other
+    solve beats.
 
     Newton solid with filled markers, IPOPT dashed with open ones. Curves end where they meet the error of the reference, at the
     edge of a grey band.
@@ -105,7 +106,7 @@ def _tick_times(axes: Axes) -> None:
 
 
 def _above(lines: Sequence[Measurement], floor: float) -> list[Measurement]:
-    """A curve down to where it first meets the error of the reference: finer meshes only take longer from there."""
+    """A curve down to where it first meets the error of the reference. Finer meshes only take longer from there on."""
     for k, line in enumerate(lines):
         if line.error <= floor:
             return list(lines[: k + 1])

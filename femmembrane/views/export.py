@@ -12,7 +12,7 @@ suffix   what is in the file                                                 rea
          equilibria or of one
 =======  ==================================================================  ==========================
 
-Lengths are in units of R0, or in m where the scene has scales (in .csv then both); normals point the way the pressure pushes.
+Lengths are in units of R0, or in m where the scene has scales; a .csv then has both. Normals point the way the pressure pushes.
 """
 
 from __future__ import annotations
@@ -47,18 +47,19 @@ def export(shown: Branch | Equilibrium, path: str | PathLike[str], *, step: int 
     path : path
         Ends in one of ``.pvd``, ``.xdmf``, ``.vtu``, ``.stl``, ``.obj``, ``.csv``.
     step : int, optional
-        The equilibrium of a file that holds one; negative ones count from the end. Default: the last for ``.vtu``, ``.stl`` and
-        ``.obj``, all for ``.csv``.
+        The equilibrium to write; negative steps count from the end. Default: the last for ``.vtu``, ``.stl`` and ``.obj``, all for
+        ``.csv``.
 
     Returns
     -------
     list of Path
-        The files written, the one to open last.
+        The files that were written. The last is the file to open.
 
     Raises
     ------
     InputError
-        For an empty branch, another suffix, a step that is not there or that the format has no use for, and a file that cannot be written.
+        For an empty branch, another suffix, a step that does not exist, a step for a format that holds all of them, and a file that cannot
+        be written.
     """
     suffix = Path(path).suffix.lower()
     check_format(suffix)

@@ -1,6 +1,7 @@
 """Maps of a sweep over two keys and curves of one over one key.
 
-What has no value, and what ended early, is hatched and named: shades and hatches read the same in grey and to the colour-blind.
+Scenes without a value, and scenes that ended early, are hatched and named. Shades and hatches read the same in grey and to the
+colour-blind.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
-#: what is shown of each quantity unless something else is asked for, as far as the sweep has it
+#: variables shown for each quantity by default, as far as the sweep has them
 SHOWN = {
     "branch": ("limit_points", "limit_pressure.0", "limit_pressure.1", "largest_wrinkled_fraction"),
     "run": ("steps", "limit_points", "limit_pressure.0", "largest_wrinkled_fraction"),
@@ -128,7 +129,7 @@ def _key_label(key: str) -> str:
 
 
 def _reasons(data: Any, values: Array) -> Array:
-    """Why a scene is not plainly a value: how its branch ended, or that there is nothing of the kind; empty for the rest."""
+    """Why a scene has no plain value: how its branch ended, or that nothing of the kind was found. Empty for plain values."""
     status = np.asarray(data["status"].values, dtype=object)
     outcome = np.asarray(data["outcome"].values, dtype=object) if "outcome" in data else np.full(status.shape, "none there", dtype=object)
     good = str(Status.CONVERGED)
@@ -175,7 +176,7 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
 
 
 def _shade(axes: Axes, name: str, x_edges: Array, y_edges: Array, grid: Array, plain: Array) -> None:
-    """Shades that span the plain values: those of a branch that ended early, perhaps far away, have the shade of the end they pass."""
+    """Shades that span the plain values. Values of a branch that ended early, perhaps far away, have the shade of the end they pass."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap
 

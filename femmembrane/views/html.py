@@ -46,7 +46,7 @@ def pairs(items: Iterable[tuple[str, Any]]) -> str:
 
 
 def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[list[Any]]]:
-    """Headings and cells of the equilibria of a branch; where there are more than ``most``, so many, evenly spread."""
+    """Headings and cells of the equilibria of a branch: all of them, or ``most`` of them, evenly spread."""
     from ..results.table import columns, estimated, value
 
     names = [name for name in columns(branch) if name not in ("iterations", "seconds")]
@@ -57,7 +57,7 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
 
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
-    """What an equilibrium is, with the verdicts that its scene asks for."""
+    """The numbers of an equilibrium, with the verdicts that its scene asks for."""
     analysis = equilibrium.scene.analysis
     energies = [("elastic energy", equilibrium.elastic_energy)]
     energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 SHOWN = 0.15
 #: sectors around the axis for each wave, so that short waves stay round
 _PER_WAVE = 12
-#: horizontal and vertical in the picture, as the camera of :func:`render_mode` looks
+#: the horizontal and the vertical of the picture, as the camera of :func:`render_mode` looks
 _TO_THE_RIGHT, _UPWARD = np.array([1.0, 0.3, 0.0]) / np.hypot(1.0, 0.3), np.array([0.0, 0.0, 1.0])
 #: colour of the equilibrium's lines
 _REST = "#4a8f4a"
@@ -49,7 +49,7 @@ def write_mode_vtk(
     """Write one period of a mode as one VTU file a frame and the PVD file that strings them together for ParaView.
 
     The VTU files go to a folder beside ``path``, named like it. Frame k has the phase 2 pi k/frames, so that the first shows the mode at
-    full amplitude, and after the last the motion repeats. The point data ``displacement`` is that from the equilibrium. Lengths are in m
+    full amplitude, and after the last the motion repeats. The point data ``displacement`` starts at the equilibrium. Lengths are in m
     where the scene has scales.
 
     Parameters
@@ -92,7 +92,7 @@ def render_mode(
     """Draw the equilibrium and, beside it, the membrane at the full amplitude of a mode, without a display.
 
     The colour is the displacement along the normal of the equilibrium, relative to the largest displacement: red the way the pressure
-    pushes, blue against it, grey where the membrane rests or moves within its own surface. Green circles are those of the equilibrium.
+    pushes, blue against it, grey where the membrane rests or moves within its own surface. Green circles belong to the equilibrium.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _draw(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
 
 
 def set_up_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
-    """What does not move: the key, and a camera that sees the whole motion."""
+    """Draw what does not move: the key, and a camera that sees the whole motion."""
     _draw_key(plotter, surface, position_x=0.58)
     low = surface.rest - 0.3 * surface.extent * _UPWARD
     moved = [surface.rest + sign * surface.displacement for sign in (1, -1)]
@@ -197,7 +197,7 @@ def set_up_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
 
 
 def draw_moved(plotter: pyvista.Plotter, surface: ModeSurface, part: float) -> None:
-    """The membrane at a part, -1 to 1, of the amplitude beside the circles of the equilibrium, in place of the one drawn before."""
+    """Draw the membrane at a part, -1 to 1, of the amplitude beside the circles of the equilibrium, in place of the last one."""
     moved = surface.rest + part * surface.displacement
     coloured = polydata(surface.revolution, moved)
     coloured.point_data["normal"] = part * surface.normal

@@ -18,7 +18,7 @@ from ..files import replace_file
 Frame = NDArray[np.uint8]
 
 SUFFIXES = (".gif", ".mp4")
-#: so many frames in all, first and last included, choose the colours of a GIF
+#: number of frames, first and last included, that choose the colours of a GIF
 _SAMPLES = 6
 
 
@@ -62,7 +62,7 @@ def _write_gif(frames: Sequence[Frame], path: Path, rate: float, hold: float) ->
     from PIL import Image
 
     chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLES).round().astype(int))
-    # one palette for all frames and no dithering: nothing flickers, and what does not move costs no bytes
+    # one palette for all frames and no dithering: nothing flickers, and parts at rest cost no bytes
     palette = Image.fromarray(np.concatenate([frames[k][::3, ::3] for k in chosen])).quantize(
         256, method=Image.Quantize.MAXCOVERAGE, kmeans=3
     )
@@ -78,7 +78,7 @@ def _write_gif(frames: Sequence[Frame], path: Path, rate: float, hold: float) ->
 def _write_mp4(frames: Iterable[Frame], path: Path, rate: float, hold: float) -> None:
     import imageio.v2 as imageio  # type: ignore[import-not-found]  # no dependency: check_movie asks for it
 
-    # even numbers of pixels and this pixel format are what players everywhere read
+    # all players read this pixel format with even numbers of pixels
     options: dict[str, Any] = {"fps": rate, "codec": "libx264", "pixelformat": "yuv420p", "quality": 8, "macro_block_size": 2}
     with imageio.get_writer(path, **options) as writer:
         for frame in frames:

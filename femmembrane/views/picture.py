@@ -38,7 +38,7 @@ _MAP = "viridis"
 _SOURCE = "#b03060"
 #: little shading, so that the colours stay those of the scale
 _MATT: dict[str, Any] = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
-#: each kind of zones in the middle of its colour, and what it is called beside it
+#: the number of each kind of zones, in the middle of its colour, and its name beside it
 _ZONE_LIMITS = (-0.5, len(KINDS) - 0.5)
 _ZONE_NAMES = ("taut", "radial", "circum-\nferential", "both\nways")
 #: nothing is rendered before all is there

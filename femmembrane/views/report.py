@@ -1,6 +1,6 @@
-"""A run as one page that needs no network: what was asked, what came out, and how far it is to be trusted.
+"""A run as one page that needs no network: what was asked, what came out, and how far it can be trusted.
 
-The page has a section for what the run has, and none for what it was not asked for. It is read on a phone as on a screen, in light and
+The page has sections for what the run has, and for nothing else. It is read on a phone as on a screen, in light and
 dark, and is the same for the same run: figures carry no date.
 """
 
@@ -122,7 +122,7 @@ class _Page:
         yield "How to cite", f"<pre>{escape(self.branch.cite())}</pre>"
 
     def summary(self) -> str:
-        """How it ended, and the ranges of the main quantities."""
+        """How the run ended, and the ranges of the main quantities."""
         branch = self.branch
         good = branch.status is Status.CONVERGED
         message = "" if good else f"<p>{escape(branch.message)}</p><p>What helps: {escape(branch.status.advice)}.</p>"
@@ -260,7 +260,7 @@ def _beside(*parts: str) -> str:
 
 
 def _shortened(part: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The keys of a table; a long list by its ends."""
+    """The keys of a table; a long list is shown by its ends."""
     for name, value in part.items():
         if isinstance(value, list) and len(value) > 12:
             yield name, f"{text(value[:3])}, …, {text(value[-1])} ({len(value)} values)"

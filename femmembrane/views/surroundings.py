@@ -1,7 +1,7 @@
-"""What stands in a picture beside the membrane, before anything is drawn: bodies of sources, and where the membrane is held.
+"""Surroundings of the membrane in a picture, before anything is drawn: bodies of sources, and where the membrane is held.
 
-Sources are asked for their :class:`~femmembrane.physics.outline.Outline`, the mesh for its supports; neither the kind of a source nor the
-shape of the membrane is known here, and pictures in the plane and in space show the same.
+Sources are asked for their :class:`~femmembrane.physics.outline.Outline`, and the mesh for its supports. The kinds of sources and shapes
+are not known here. Pictures in the plane and in space show the same.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Box:
 
     @property
     def size(self) -> float:
-        """Its larger side, both halves of the membrane taken together."""
+        """The larger side of the box, with both halves of the membrane."""
         return max(2 * self.radius, self.high - self.low)
 
 
@@ -87,7 +87,7 @@ def surroundings(scene: Scene, box: Box) -> Surroundings:
 
 
 def clamped_ends(equilibrium: Equilibrium, nodes: int = 2) -> list[tuple[int, float, float]]:
-    """The ends of the meridian that are held in every direction, off the axis: place among so many nodes, radius, height."""
+    """The ends of the meridian off the axis that are held in every direction: place among ``nodes``, radius, height."""
     space, profile = equilibrium.potential.space, equilibrium.profile()
     return [
         (end % nodes, float(profile["rho"][end]), float(profile["eta"][end]))
@@ -97,7 +97,7 @@ def clamped_ends(equilibrium: Equilibrium, nodes: int = 2) -> list[tuple[int, fl
 
 
 def place_of(step: int | None, count: int) -> int:
-    """Place of a step among so many, negative ones counted from the end; without a step the last.
+    """Place of a step among ``count``. Negative steps count from the end; without a step it is the last.
 
     Raises
     ------
@@ -117,6 +117,6 @@ def _cut(body: Outline, box: Box) -> Outline:
 
 
 def _distance(body: Outline, box: Box) -> float:
-    """From the nearest corner of the body to the box."""
+    """Distance from the nearest corner of the body to the box."""
     rho, z = np.array(body.points).T
     return float(np.min(np.hypot(np.maximum(rho - box.radius, 0), np.maximum(np.maximum(box.low - z, z - box.high), 0))))

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
     from ..results.records import Branch, Equilibrium
 
-#: of a window and a picture, and of a movie, whose frames take a quarter of a second each without a graphics card
+#: sizes of a window and a picture, and of a movie; its frames take a quarter of a second each without a graphics card
 SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
 #: most frames of a movie of a branch, and frames of one period of a mode
 _MOST, _PERIOD = 90, 30
 _RATE = 12.0
-#: seconds for which the last step of a branch stays, and the picture of a window between two phases of a mode, in milliseconds
+#: seconds for which the last step of a branch stays; milliseconds between two phases of a mode in a window
 _HOLD, _PAUSE = 1.5, 50
 
 
@@ -42,7 +42,7 @@ def view(
     movie: str | PathLike[str] | None = None,
     size: tuple[int, int] | None = None,
 ) -> None:
-    """Show the membrane in space: in a window, or, where a file is asked for, in files and without a display.
+    """Show the membrane in space: in a window, or in files and without a display if files are asked for.
 
     Camera and colours are the same for all steps of a window or a movie.
 
@@ -52,21 +52,20 @@ def view(
     color : str
         What the colour shows: a stretch or a stress of the profile (``stretch_1``, ``total_stress_2``, ...), or ``zone``.
     step : int, optional
-        The equilibrium of a picture, and of a mode; in a window, the first that is shown. Default the last; negative ones count
-        from the end.
+        The equilibrium of a picture or of a mode; in a window, the one shown first. Default: the last. Negative steps count from the end.
     mode : int, optional
-        Show the lowest mode with so many waves around the axis in motion about that equilibrium, in place of the steps.
+        Number of waves around the axis. The lowest mode with so many waves moves about the equilibrium, in place of the steps.
     screenshot : path, optional
         PNG file to write.
     movie : path, optional
         GIF or MP4 file to write: all steps (90 of them, where there are more), or one period of the mode.
     size : tuple of int
-        Width and height in pixels; default (1200, 900), of a movie (720, 540).
+        Width and height in pixels. Default: (1200, 900), for a movie (720, 540).
 
     Raises
     ------
     InputError
-        For an empty branch, an unknown colour, a step that is not there, a file that cannot be written, MP4 without a writer, and a
+        For an empty branch, an unknown colour, a step that does not exist, a file that cannot be written, MP4 without a writer, and a
         window without a display.
     SolveError
         For a mode of a state that has no natural modes.

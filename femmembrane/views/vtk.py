@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
 
-#: profile quantities that a file shows as point data, in this order; those in Pa when the scene has scales
+#: profile quantities that a file shows as point data, in this order; quantities in Pa only when the scene has scales
 FIELDS = (
     "stretch_1",
     "stretch_2",
@@ -136,7 +136,7 @@ def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[
 
 
 def write_collection(path: str | PathLike[str], count: int, write_one: Callable[[int, Path], None]) -> list[Path]:
-    """Write numbered VTU files to a folder beside a PVD file, and the PVD file last; those of an earlier, longer collection are removed.
+    """Write numbered VTU files to a folder beside a PVD file, and the PVD file last. Files of an earlier, longer collection are removed.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def write_collection(path: str | PathLike[str], count: int, write_one: Callable[
 
 
 def remove_surfaces(path: Path, keep: int = 0) -> None:
-    """Remove the VTU files that belong to a PVD file, but for the first few."""
+    """Remove the VTU files that belong to a PVD file, except the first few."""
     folder = path.with_suffix("")
     if folder.is_symlink():  # whatever is there belongs to somebody else
         return
@@ -170,7 +170,7 @@ def remove_surfaces(path: Path, keep: int = 0) -> None:
 
 
 def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array]:
-    """The profile at the nodes, with any value that is not defined on the axis (0/0) taken from the node next to it.
+    """The profile at the nodes. A value that is not defined on the axis (0/0) is taken from the node beside it.
 
     With fewer nodes than ``points`` it is taken at that many places instead, so that the curvature of long elements shows.
     """
@@ -187,7 +187,7 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
 
 
 def shown_length(equilibrium: Equilibrium) -> float:
-    """Length in a file of the unit of length R0: 1, or what it is in m where the scene has scales."""
+    """Length of R0 in a file: 1, or its length in m where the scene has scales."""
     scales = equilibrium.scene.scales
     return 1.0 if scales is None else scales.to_si("length", 1.0)
 
@@ -212,7 +212,7 @@ def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: 
 
 
 def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolution: Revolution) -> dict[str, NDArray[Any]]:
-    """What is known at the points of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
+    """Point data of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
     parameters = equilibrium.potential.space.node_parameters()
     R, Z = equilibrium.scene.mesh.position(parameters)
     moved = revolution.vectors(profile["rho"] - R, profile["eta"] - Z)

@@ -1,7 +1,5 @@
-"""How wrinkling zones are drawn: patterns, not colours, that say which way the wrinkles run.
-
-Along a curve a pattern is a band whose edges differ, and which is light behind the line; in a filled region it is a hatch, with the pole
-at the bottom::
+"""How wrinkling zones are drawn: in patterns, not colours, that say which way the wrinkles run. Along a curve a pattern is a light band
+behind the line, whose edges differ. In a filled region it is a hatch, with the pole at the bottom::
 
     radial             thin rails along the curve      strokes from the pole to the rim
     circumferential    short teeth across the curve    strokes along circles
@@ -81,7 +79,7 @@ def zone_label(scene: Scene, kind: str) -> str:
 
 
 def zone_order(label: str) -> int:
-    """Place of a label among those of the kinds of zones; their number for any other label."""
+    """Place of a label among the labels of the kinds of zones. Any other label comes after all of them."""
     return next((k for k, pattern in enumerate(PATTERNS.values()) if label.startswith(pattern.name)), len(PATTERNS))
 
 
@@ -120,8 +118,8 @@ def shown_kinds(zones: Zones) -> tuple[str, ...]:
 def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     """The zones of a branch as filled regions, the parameter of the meridian (of a flat one: the reference radius) upwards.
 
-    Borders go straight from one equilibrium to the next; where the kinds of zones change, the states between are interpolated, but for
-    a snap, which has none.
+    Borders go straight from one equilibrium to the next. Where the kinds of zones change, states between are interpolated; a snap has no
+    states between.
 
     Parameters
     ----------
@@ -153,7 +151,7 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
 
 
 def _runs(x: Array, zones: Sequence[Zones], snaps: frozenset[int]) -> Iterator[tuple[Array, list[Zones]]]:
-    """Stretches with the same kinds of zones and no snap, and their places with those half-way to what comes before and after."""
+    """Stretches with the same kinds of zones and no snap, and their places, extended half-way to the stretches before and after."""
     half = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
     if x.size == 1:
         half += (-0.5, 0.5)

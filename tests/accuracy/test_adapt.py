@@ -54,7 +54,7 @@ def test_true_errors_are_below_the_request(name, accuracy):
         energy, size = table["elastic_energy"] + table["magnetic_energy"], abs(table["elastic_energy"]) + abs(table["magnetic_energy"])
         errors += [abs(eq.pressure / table["pressure"] - 1), abs(eq.energy - energy) / size]
     assert max(errors) < accuracy
-    # the estimate is that of the worst of these very states, and good to some tens of per cent
+    # the worst of these very states gives the estimate, which is good to some tens of per cent
     assert 0.5 * max(errors) < branch.scene.mesh.estimated < 2 * max(errors)
 
 
@@ -125,7 +125,7 @@ def test_one_equilibrium():
 
 
 def test_convergence_study():
-    """Its meshes are graded like the one that was chosen."""
+    """Its meshes are graded like the chosen mesh."""
     study = fm.convergence(asking(disc_scene(OGDEN), 1e-6), volume=5.0, degrees=(2,), elements=(8, 16, 32))
     assert study.orders("pressure")[0, -1] == pytest.approx(4, abs=0.5)
 

@@ -89,7 +89,7 @@ SHAPES = {
 @pytest.mark.parametrize(("mesh", "volume"), SHAPES.values(), ids=SHAPES)
 @pytest.mark.parametrize("degree", [1, 2, 4])
 def test_derivatives_and_the_work_of_the_pressure(mesh: Any, volume: float, degree: int) -> None:
-    """Gradients and Hessian are those of the energies (central differences), and at equilibria dE = P dV with the hubs' share in V."""
+    """Gradients and Hessian agree with central differences of the energies. At equilibria dE = P dV, with the hubs' share in V."""
     scene = of(mesh, degree=degree)
     potential = potential_of(scene)
     x = guess_at_volume(potential, volume)
@@ -464,12 +464,12 @@ def test_a_bowl_is_a_dome_upside_down() -> None:
 
 
 def test_half_a_sphere_is_half_of_the_sphere() -> None:
-    """With a mirror at its rim; its modes are those of the sphere that have the mirror's symmetry: the pear across the axis is one."""
+    """With a mirror at its rim; its modes are the modes of the sphere with the mirror's symmetry: the pear across the axis is one."""
     whole = balloon(1.6)
     half = fm.equilibrium(of(fm.cap(1.0, 6, rim="mirror"), one_term(1.0), degree=4), volume=whole.volume / 2, solver="newton")
     assert half.pressure == pytest.approx(whole.pressure, rel=1e-10)
     assert half.energy == pytest.approx(whole.energy / 2, rel=1e-10)
-    assert half.verdict("volume").stable  # a pear along the axis is none
+    assert half.verdict("volume").stable  # a pear along the axis does not have it
     assert half.verdict(azimuthal=1).smallest_eigenvalue == pytest.approx(whole.verdict(azimuthal=1).smallest_eigenvalue, rel=1e-5)
 
 
@@ -482,7 +482,7 @@ def test_half_a_tube_and_a_full_one() -> None:
 
 
 def test_a_hub_that_shrinks_becomes_a_pole() -> None:
-    """The disc glued to a rigid patch of radius a: pressure and height tend to those of the disc."""
+    """The disc glued to a rigid patch of radius a: pressure and height tend to the values of the disc."""
     expected = fm.equilibrium(of(fm.disc(64, ratio=40)), volume=1.0)
     misses = [abs(fm.equilibrium(of(fm.annulus(a, 64, ratio=40)), volume=1.0).pressure / expected.pressure - 1) for a in (0.1, 0.05, 0.025)]
     assert misses[0] > 2.5 * misses[1] > 2.5**2 * misses[2]
@@ -595,7 +595,7 @@ def test_a_sphere_between_two_dipoles_is_held_by_them() -> None:
 @pytest.mark.parametrize("degree", [1, 2, 3, 5])
 @pytest.mark.parametrize("elements", [3, 4, 9])
 def test_a_closed_curve_is_numbered_folded(elements: int, degree: int) -> None:
-    """Every node has one number, the ends share one, and the band is at most twice that of an open curve."""
+    """Every node has one number, the ends share one, and the band is at most twice as wide as for an open curve."""
     space = Space(fm.torus(2.0, elements), degree)
     n = elements * degree
     assert sorted(space.nodes[:-1]) == list(range(n))

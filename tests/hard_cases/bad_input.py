@@ -137,7 +137,7 @@ CONTRADICTIONS: tuple[tuple[int, str, Any, str], ...] = (
     (3, "membrane.radius_to_thickness", 50, "membrane.radius_to_thickness"),
     (3, "scales.radius", 1e308, "scales"),
 )
-#: valid TOML of other programs, and a key of each that is none of a scene
+#: valid TOML of other programs, and a key of each that no scene has
 FOREIGN = {
     '[build-system]\nrequires = ["hatchling"]\n[project]\nname = "x"\n': "build-system",
     '[package]\nname = "x"\nedition = "2021"\n[dependencies]\nserde = "1.0"\n': "package",

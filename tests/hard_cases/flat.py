@@ -111,7 +111,7 @@ MIRRORED = "passes the state without stiffness"
 @FAMILY.case("V: 1, 1e-9, -1", MIRRORED + " from next to it", Number((1.0, 1.0), rel=1e-9), "volume", (1.0, 1e-9, -1.0))
 @FAMILY.case("heights: 1, -1", MIRRORED, Number((1.0, 1.0), rel=1e-9), "height", (1.0, -1.0))
 def to_the_mirror_image(control: str, values: tuple[float, ...]) -> tuple[float, float]:
-    """V and P of the last state over those of the first, signs reversed."""
+    """V and P of the last state over V and P of the first, signs reversed."""
     run = reached(fm.run(NH.replace(run=fm.Run(control=control, values=values))))
     return -run[-1].volume / run[0].volume, -run[-1].pressure / run[0].pressure
 

@@ -40,7 +40,7 @@ LIMIT, SLOW_LIMIT = 60.0, 1200.0
 
 @dataclass(frozen=True)
 class Number:
-    """One number, or a tuple of them, each within ``rel`` of its own size or ``abs``, whichever is more."""
+    """One number, or a tuple of numbers, each within the larger of ``rel`` times its size and ``abs``."""
 
     value: float | tuple[float, ...]
     rel: float = 0.0

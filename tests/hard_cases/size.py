@@ -27,7 +27,7 @@ def far_out(material: object, volume: float) -> float:
 @FAMILY.case("V = 1e5, neo-Hookean", "the pole thins to 1e-4 of T", Number(1.0, rel=2e-3), 1e5, 64, 2)
 @FAMILY.case("V = 1e12, neo-Hookean", "and to 1e-9", Number(1.0, rel=1e-2), 1e12, 64, 4)
 def thin_pole(volume: float, elements: int, degree: int) -> float:
-    """P over that of a mesh graded for it, as far as degree 8 resolves it."""
+    """P over the P of a mesh graded for it, as far as degree 8 resolves it."""
     eq = settled(fm.equilibrium(disc_scene(NH, elements=elements, degree=degree), volume=volume))
     graded = fm.Scene(material=NH, mesh=fm.disc(elements=32, ratio=1e-3), degree=8)
     return eq.pressure / settled(fm.equilibrium(graded, volume=volume)).pressure
@@ -56,7 +56,7 @@ LOCKING = "the pole at {} of J_m, where the energy has no bound"
 @FAMILY.case("Gent, J_m = 2, P = 100", LOCKING.format("99 %"), Number((1.0, 1.0), rel=1e-9), 2.0, 0.98, {"pressure": 100.0})
 @FAMILY.case("Gent, J_m = 30, P = 100", LOCKING.format("99 %"), Number((1.0, 1.0), rel=1e-9), 30.0, 0.98, {"pressure": 100.0})
 def locking(jm: float, share: float, load: dict[str, float]) -> tuple[float, float]:
-    """P and V over those of shooting; somewhere I_1 - 3 is above this share of J_m."""
+    """P and V over the values by shooting; somewhere I_1 - 3 is above this share of J_m."""
     scene = disc_scene(fm.Gent(jm), elements=16, degree=6)
     eq = settled(fm.equilibrium(scene, **load))
     found = shoot(scene, guess=Guess.of(eq), **load)
@@ -102,7 +102,7 @@ def few_elements(elements: int, degree: int) -> float:
 
 @FAMILY.case("one linear element, by the corrector and traced", "the volume alone fixes the shape, not P", Number((0.0, 0.0), abs=1e-13))
 def cone() -> tuple[float, ...]:
-    """P over that of a cone by hand, 3 H (1 - (1 + H^2)^-2) at V = pi H/3, less one."""
+    """P over the P of a cone by hand, 3 H (1 - (1 + H^2)^-2) at V = pi H/3, less one."""
     scene = disc_scene(NH, elements=1, degree=1)
     found = [fm.equilibrium(scene, volume=1.0, solver="newton"), reached(fm.trace(scene, start=0.5, until={"volume": 2.0}))[-1]]
     heights = [3 * eq.volume / np.pi for eq in found]
@@ -142,7 +142,7 @@ MANY = "round-off grows with the elements"
 @FAMILY.case("5000 elements", MANY, Number(1.0, rel=1e-11), 5_000)
 @FAMILY.case("1000000 elements", MANY, Number(1.0, rel=1e-9), 1_000_000, slow=True)
 def many_elements(elements: int) -> float:
-    """P over that of 32 elements of degree 8, at V = 30 under a dipole."""
+    """P over the P of 32 elements of degree 8, at V = 30 under a dipole."""
     eq, fine = (
         settled(fm.equilibrium(disc_scene(OGDEN, (200.0, 6.5), n, p), volume=30.0, solver="newton")) for n, p in ((elements, 2), (32, 8))
     )

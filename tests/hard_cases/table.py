@@ -21,7 +21,7 @@ def row(case: Case, outcome: Outcome) -> str:
 
 
 def table(cases: Sequence[Case], outcomes: Mapping[Case, Outcome], readme: str) -> str:
-    """The whole table, one heading a family; the line of a case without an outcome is that of the README."""
+    """The whole table, one heading a family. A case without an outcome keeps its line of the README."""
     old = {_start(line): line for line in readme.split(BEGIN)[1].split(END)[0].splitlines()}
     lines, family = [], None
     for case in cases:

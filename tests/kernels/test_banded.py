@@ -47,7 +47,7 @@ def test_bordered_solve(seed, kd, corner):
     full = bordered(matrix, column, row, corner)
     exact = rng.normal(size=n + 1)
     found = BorderedFactor(BandFactor(to_band(matrix, kd)), column, row, corner).solve(full[:n] @ exact, full[n] @ exact)
-    # backward stable: the error is that of the condition of the bordered matrix
+    # backward stable: the error follows from the condition of the bordered matrix
     assert relative_error(found, exact) < 1e-13 * np.linalg.cond(full)
 
 

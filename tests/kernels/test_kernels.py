@@ -80,7 +80,7 @@ def test_evaluation_and_assembly(name):
                 close(a.reshape(-1, nq * ne)[k], row)
         close(found.band, expected.band)
         assert found.finite is expected.finite is True
-        # forces nearly cancel in a node: compared with those that meet there
+        # forces nearly cancel in a node: they are compared with the forces that meet there
         scale = max(in_numpy(potential.force_scale, expected, 1.3))
         np.testing.assert_allclose(found.gradient, expected.gradient, rtol=0, atol=1e-13 * scale)
 

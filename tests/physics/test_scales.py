@@ -424,7 +424,7 @@ def test_rendered(bare, scaled, tmp_path):
 
 
 def test_a_trace_continued_with_scales_has_them_from_its_start():
-    """Scales change no equilibrium, so a branch without them may be continued with them; its columns are then those of one scene."""
+    """Scales change no equilibrium, so a branch without them may be continued with them; all rows then have the same columns."""
     scene = MAGNETIC.replace(scales=MAGNET)
     half = fm.trace(MAGNETIC, start=1.0, until={"volume": 4.0}, max_steps=4, throw=False)
     whole = fm.trace(scene, start=half, until={"volume": 4.0})
@@ -459,7 +459,9 @@ def test_si_values_that_no_float_holds(quantity, value):
 
 
 def test_run_of_a_scene_file(tmp_path):
-    """From a moment in A m^2 to a pressure in Pa: the folder is that of a scene with the strength written out, and two numbers more."""
+    """From a moment in A m^2 to a pressure in Pa: the folder is the same as for a scene with the strength written out, and has two numbers
+    more.
+    """
     text = """
         [material]
         model = "neo-hookean"

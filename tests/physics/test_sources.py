@@ -74,7 +74,7 @@ def exact_loop(a, rho, z, n=4096):
 @pytest.mark.parametrize(
     ("a", "rho", "z", "digits"),
     [
-        (0.5, 1e-7, 0.2, 1e-11),  # extended precision has 19 digits, of which rho takes seven
+        (0.5, 1e-7, 0.2, 1e-11),  # extended precision has 19 digits, and rho takes seven of them
         (0.5, 1e-3, 0.2, 1e-14),
         (0.01, 0.5, 3.0, 1e-13),  # far away the integrals nearly cancel
         (0.5, 0.5, 0.02, 1e-14),  # next to the wire

@@ -173,7 +173,7 @@ def test_hessian_of_a_wrinkled_state():
     assert np.abs(found - numeric).max() < 1e-7 * np.abs(found).max()
 
 
-# --- off means off, and taut states are those of the plain membrane
+# --- off means off, and taut states are plain
 
 
 def test_off_builds_nothing():
@@ -238,7 +238,7 @@ def wrinkled_state(scene: fm.Scene):
 
 @pytest.mark.parametrize("n", [0, 1, 2, 5])
 def test_second_differences_of_the_relaxed_surface_energy(n):
-    """The form with n waves against the finite surface in three dimensions, whose principal stretches are those of its metric."""
+    """The form with n waves against the finite surface in three dimensions, whose principal stretches follow from its metric."""
     potential, x = wrinkled_state(disc_scene(elements=6).replace(tension_field=True))
     r = azimuthal_operator(potential, x, 0.0, n).response
     assert {bool(v) for v in (r.s2 == 0).ravel()} == {True, False}

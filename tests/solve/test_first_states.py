@@ -1,7 +1,7 @@
 """States that are asked for cold and are known to exist: each is answered, whatever its units, its signs, its supports and its symmetry.
 
-Numbers without another source are those of the independent dense walk of :mod:`.walker`, along small steps from a state that certainly
-exists, on the mesh of the test. :mod:`tests.verification.test_population` asks many more.
+Numbers without another source come from the independent dense walk of :mod:`tests.walker`: small steps from a state that certainly exists, on
+the mesh of the test. :mod:`tests.verification.test_population` asks many more.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def test_a_volume_beyond_locking_is_refused_in_words(mesh, volume, degree, solve
 
 @pytest.mark.parametrize("size", [1e-3, 7.0, 1e3])
 def test_points_of_any_size(size):
-    """The sphere of Gent's material through points; curved cells are parabolas, so that its volume is not quite that of the sphere."""
+    """The sphere of Gent's material through points; curved cells are parabolas, so that its volume differs a little."""
     eq = fm.equilibrium(fm.Scene(material=fm.Gent(2.0), mesh=sphere_of_points(size)), pressure=100.0 / size)
     assert eq.volume == pytest.approx(4 / 3 * math.pi * (gent_sphere(100.0, 2.0) * size) ** 3, rel=1e-4)
 
@@ -180,7 +180,7 @@ def test_a_tube_between_two_plates_moves_along_no_axis(how, solver):
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("pressure", [1e-6, 1e-10])
 def test_a_tube_with_hubs_at_a_faint_pressure(pressure, solver):
-    """Linear elasticity, whose compliance is that of the walk at P = 1e-6."""
+    """Linear elasticity; its compliance comes from the walk at P = 1e-6."""
     scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(2.0, 16, top="hub", bottom="hub"))
     eq = fm.equilibrium(scene, pressure=pressure, solver=solver)
     assert eq.pressure == pressure

@@ -36,8 +36,9 @@ def test_all_equilibria_below_a_strong_dipole():
 
 @pytest.mark.parametrize("elements", [16, 64])
 def test_folded_shapes_of_a_mesh_are_no_equilibria(elements):
-    """Without a dipole the disc at P = 1.7 has three equilibria. On some meshes deflation also finds shapes folded within one element,
-    in compression, of which the continuous problem knows nothing: they are left out, and counted."""
+    """Without a dipole the disc at P = 1.7 has three equilibria. On some meshes deflation also finds shapes folded within one element, in
+    compression. The continuous problem does not have them: they are left out, and counted.
+    """
     found = fm.equilibria(disc_scene(OGDEN, elements=elements), pressure=1.7)
     assert sorted(eq.volume for eq in found) == pytest.approx([1.57034, 5.3143, 54.055], rel=1e-4)
     assert all(eq.status is fm.Status.CONVERGED for eq in found)

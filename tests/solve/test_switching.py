@@ -62,7 +62,7 @@ def test_branch_points_lie_where_the_tension_is_stationary() -> None:
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_other_branch_is_traced_from_a_branch_point(direction: int) -> None:
-    """It sets out at the branch point, meets the sphere again at the other one, and goes on as its mirror image until it closes."""
+    """It sets out at the branch point, meets the sphere again at the second one, and goes on as its mirror image until it closes."""
     first, second = branch_points(round_balloon())
     branch = fm.trace(sphere(), start=first, direction=direction)
     assert branch.status is fm.Status.CLOSED
@@ -240,7 +240,7 @@ def test_the_crossing_of_pears_is_a_pitchfork() -> None:
 
 
 def test_the_equation_of_a_transcritical_crossing(monkeypatch) -> None:
-    """a = 0 leaves the branch along g and 2 b alpha + c beta = 0: with b = 1, c = 1/2 the other one runs along g/4 - phi."""
+    """a = 0 leaves the branch along g and 2 b alpha + c beta = 0: with b = 1, c = 1/2 the second branch runs along g/4 - phi."""
     potential, known = pitchfork()
     plain = crossing_at(potential, known)
     answers = iter([(0.0, 1.0), (1.0, 1.0), (0.5, 1.0)])

@@ -83,7 +83,7 @@ def test_reference_eigenvalues(point: Point) -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 5])
 def test_order_of_convergence(n: int) -> None:
-    """P2 eigenvalues converge at order 4; the limit is that of elements of degree 8."""
+    """P2 eigenvalues converge at order 4; elements of degree 8 give the limit."""
 
     def value(elements: int, degree: int) -> float:
         eq = at_height(disc_scene(dipole=(600, -3.5), elements=elements, degree=degree), 0.5)
@@ -175,8 +175,9 @@ def test_sizes_and_symmetry() -> None:
 def _surface_energies(potential: Potential, x: np.ndarray, mode: np.ndarray, n: int, step: float) -> np.ndarray:
     """Elastic and magnetic energy and volume of the surface displaced by ``step`` times the mode, by quadrature around the axis.
 
-    The elastic energy is that of the true Cauchy-Green tensor, the magnetic one that of the distance to the axis, the volume the flux
-    of z, or with lids of half the distance to the axis, which lids of horizontal radii let none of through: nothing is linearised.
+    The elastic energy is computed from the true Cauchy-Green tensor, the magnetic energy from the distance to the axis, and the volume as
+    the flux of z. With lids the volume is half the flux of the distance to the axis, since lids of horizontal radii let none of it through.
+    Nothing is linearised.
     """
     space = potential.space
     u, u_x, w, w_x = space.at_quadrature(x).reshape(4, *space.R.shape)[..., None]

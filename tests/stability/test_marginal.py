@@ -14,7 +14,7 @@ def limit_points():
 
 
 def test_limit_points_are_marginal_under_pressure_and_stable_under_volume(limit_points):
-    """At dP = 0 the smallest eigenvalue under pressure control vanishes; under volume control it is that of tests/data/disc.json."""
+    """At dP = 0 the smallest eigenvalue under pressure control vanishes; under volume control tests/data/disc.json has it."""
     assert len(limit_points) == 2
     for eq, under_volume in zip(limit_points, (10.073688557, 7.075426334), strict=True):
         verdict = eq.verdict("pressure")

@@ -85,7 +85,7 @@ def test_zones_of_a_tension_field():
 
 
 def test_tension_field_on_arrays():
-    """A relaxed energy is for arrays as for symbols: that of the natural strains (its module), here written out case by case."""
+    """A relaxed energy is the same for arrays and for symbols: the energy at the natural strains, here written out case by case."""
     e1, e2 = np.array([0.2, 0.2, -0.3, -0.1]), np.array([0.1, -0.3, 0.2, -0.2])
     natural = np.array([0.2, 0.2, -0.1, 0.0]), np.array([0.1, -0.1, 0.2, 0.0])
     np.testing.assert_allclose(TensionField(OGDEN).energy(e1, e2), OGDEN.energy(*natural), atol=1e-16)
@@ -134,7 +134,7 @@ def test_thin_zones_are_found(middle):
 
 
 def test_border_at_a_jump_is_the_end_of_the_element():
-    """From degree 4 on slopes are those of the elements: with u = s/10, then (1 - s)/10, the meridian is stretched to 1.1, then to 0.9."""
+    """From degree 4 on the elements give the slopes: with u = s/10, then (1 - s)/10, the meridian is stretched to 1.1, then to 0.9."""
     scene = fm.Scene(NEO, mesh=fm.disc(4), degree=4)
     found = equilibrium(scene, state(scene, lambda s: np.minimum(s, 1 - s) / 10, zero)).zones("mechanical")
     assert found.kinds == ("taut", "circumferential", "double")
@@ -175,7 +175,7 @@ numbers = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
 )
 @settings(max_examples=80, deadline=None)
 def test_zones_tile_the_membrane(u, w, pressure, criterion, tension_field, mesh):
-    """Any state: no gap, no overlap, neighbours differ, fractions add up, and the signs are those of the profile."""
+    """Any state: no gap, no overlap, neighbours differ, fractions add up, and the signs agree with the profile."""
     scene = fm.Scene(NEO, fm.disc(mesh[0]), mesh[1], [fm.Dipole(1.0, 4.0)], 2.5, 1.0, tension_field)
     wave = [lambda s, k=k: np.cos(k * np.pi * s) / 5 for k in range(3)]
     x = state(
@@ -239,7 +239,7 @@ def test_borders_agree_between_degrees():
 def test_borders_converge_at_the_order_of_the_stress(degree, recorded):
     """One order better than the derivative of the solution, as recovered slopes are.
 
-    The error of a border depends on where in its element it lies: so that of ten of them in the mean; with 128 elements as recorded on
+    The error of a border depends on where in its element it lies. So it is averaged over ten borders; with 128 elements as recorded on
     2026-11-24 against 24 elements of degree 8.
     """
 

@@ -1,4 +1,4 @@
-"""Sweeps: rows against single computations, the same rows whoever computes them, resumption, failures, maps and the command."""
+"""Sweeps: rows against single computations, the same rows in any process, resumption, failures, maps and the command."""
 
 from __future__ import annotations
 
@@ -309,7 +309,7 @@ def test_a_plan_counts_and_times(tmp_path):
     assert not list(tmp_path.iterdir())  # a dry run makes nothing
 
 
-# --- the same rows whoever computes them
+# --- the same rows in any process
 
 
 def wide():

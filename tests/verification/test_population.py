@@ -42,7 +42,7 @@ def test_the_population_is_answered():
 
 @pytest.mark.parametrize("member", FEW[::8], ids=lambda member: str(member.seed))
 def test_a_walk_finds_what_is_recorded(member):
-    """The record is that of the walk, up to round-off."""
+    """The record agrees with the walk, up to round-off."""
     again = walk(member.seed)
     assert (again.volume, again.pressure) == pytest.approx((member.volume, member.pressure), rel=1e-6, abs=1e-12)
     assert (again.factor, again.minimum) == (member.factor, member.minimum)

@@ -74,7 +74,7 @@ def test_smallest_eigenvalues(problem):
     eq, expected = problem.solve("ipopt"), problem.point.expected
     for control in ("pressure", "volume"):
         verdict = eq.verdict(control)
-        if problem.point.kind == "limit_point" and control == "pressure":  # zero there, so relative to the other one
+        if problem.point.kind == "limit_point" and control == "pressure":  # zero there, so relative to the one under volume control
             assert abs(verdict.smallest_eigenvalue) < 1e-4 * expected["lambda_volume"]
         else:
             assert verdict.smallest_eigenvalue == pytest.approx(expected[f"lambda_{control}"], rel=1e-4)

@@ -118,7 +118,7 @@ def test_flat_limit_from_cold(material):
 @pytest.mark.parametrize("control", ["pressure", "volume"])
 @pytest.mark.parametrize("volume", [1e-9, 1e-8, 1e-6, 1e-5])
 def test_flat_limit_of_the_eigenvalues(volume, control):
-    """lambda ~ V^2: the transverse stiffness is the tension. The constant is that at V = 1e-4, where nothing is near round-off."""
+    """lambda ~ V^2: the transverse stiffness is the tension. The constant is taken at V = 1e-4, where nothing is near round-off."""
     scene = disc_scene(elements=16)
     small, reference = (fm.equilibrium(scene, volume=v, solver="newton") for v in (volume, 1e-4))
     assert small.verdict(control).stable is True

@@ -85,7 +85,7 @@ def test_zones_are_coloured_between_their_borders() -> None:
 
 
 def test_colours_are_ordered_in_grey() -> None:
-    """Luma of the zones falls from the taut one; so does that of the map of quantities."""
+    """The luma of the zones falls from the taut zone on. The luma of the map of quantities falls too."""
     from matplotlib import colormaps
     from matplotlib.colors import to_rgb
 

@@ -10,9 +10,10 @@ suffix                    what is read
 .inp                      Abaqus: nodes, line elements and sets of elements
 ========================  ==========================================================================================================
 
-Files come from anywhere. They are read by code of this package, in Python, for two reasons: a damaged file can end no process, and nothing
-is unpacked before it is known to fit (:data:`MOST_NUMBERS`). The readers for whole meshes that exist promise neither. A reader answers
-with :class:`Lines` or raises :class:`UnreadableError` with a reason; what else it meets in a damaged file is caught by :func:`read_lines`.
+Files may come from any program. They are read by code of this package, in Python, for two reasons: a damaged file can end no process, and
+nothing is unpacked before it is known to fit (:data:`MOST_NUMBERS`). The readers for whole meshes that exist promise neither. A reader
+answers with :class:`Lines` or raises :class:`UnreadableError` with a reason; what else it meets in a damaged file is caught by
+:func:`read_lines`.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: sizes beyond which a file is refused: that of the file itself in bytes, and that of any list of numbers in it
+#: sizes beyond which a file is refused: of the file itself in bytes, and of any list of numbers in it
 MOST_BYTES, MOST_NUMBERS = 2**28, 2 * 10**7
 #: readers by suffix: a module here with a function ``read(path)``
 READERS = {".vtu": "vtk_xml", ".msh": "gmsh", ".vtk": "vtk_legacy", ".xdmf": "xdmf", ".vtp": "vtk_xml", ".inp": "abaqus"}
@@ -42,7 +43,7 @@ class UnreadableError(Exception):
 
 
 def printable(text: str) -> str:
-    """A text from a file without what would move the cursor of a terminal, or worse."""
+    """A text from a file without control characters, which could move the cursor of a terminal, or worse."""
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
@@ -114,7 +115,7 @@ def _check(lines: Lines) -> None:
 
 
 def count(value: Any, what: str, most: int = MOST_NUMBERS) -> int:
-    """A number of things, declared in a file; UnreadableError if it is none or too large."""
+    """A number of things, declared in a file; UnreadableError if it is no number or too large."""
     try:
         number = int(value)
     except (TypeError, ValueError, OverflowError):

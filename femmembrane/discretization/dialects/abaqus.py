@@ -1,4 +1,4 @@
-"""Lines in input files of Abaqus (.inp): *NODE, *ELEMENT of line elements, *NSET is left out, *ELSET names groups."""
+"""Lines in input files of Abaqus (.inp): *NODE, and *ELEMENT of line elements. *ELSET names groups; *NSET is ignored."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TWO = ("B21", "B31", "B23", "B33", "T2D2", "T3D2", "SAX1", "MAX1", "MGAX1", "R2
 _THREE = ("B22", "B32", "T2D3", "T3D3", "SAX2", "MAX2", "MGAX2")
 
 
-#: what makes or moves nodes and elements without listing them
+#: keywords that make or move nodes and elements without listing them
 _MAKERS = ("*NGEN", "*NFILL", "*NCOPY", "*NMAP", "*ELGEN", "*ELCOPY", "*SYSTEM")
 #: numbers of elements from, to, by steps of
 _Range = tuple[int, int, int]
@@ -23,7 +23,7 @@ _Range = tuple[int, int, int]
 
 @dataclass
 class _Part:
-    """What stands between *PART and *END PART, where numbers of nodes and elements start anew; or outside of all parts."""
+    """The lines between *PART and *END PART, where numbers of nodes and elements start anew, or the lines outside of all parts."""
 
     nodes: list[list[str]] = field(default_factory=list)
     blocks: list[tuple[str, str, list[list[str]]]] = field(default_factory=list)
@@ -127,7 +127,7 @@ def _elements(
 
 
 def _whole_rows(body: list[list[str]], width: int) -> list[list[str]]:
-    """Rows that go on in the next line where they are too short, made one."""
+    """Rows of full length: a row that is too short goes on in the next line."""
     rows: list[list[str]] = []
     for row in body:
         if rows and len(rows[-1]) < width:
@@ -176,7 +176,7 @@ def _add(lines: Lines, tags: NDArray[np.int64], table: NDArray[np.int64], member
 
 
 def _inner_last(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Cells with the point inside last: programs write it second or third, so it is the one that sees the others in opposite directions."""
+    """Cells with the point inside last. Programs write it second or third; seen from it, the two ends lie in opposite directions."""
     corners = points[nodes]
     seen = [((corners[:, (k + 1) % 3] - corners[:, k]) * (corners[:, (k + 2) % 3] - corners[:, k])).sum(axis=1) for k in range(3)]
     inner = np.argmin(seen, axis=0)

@@ -104,7 +104,7 @@ class _Reader:
         self._read_geometry(parts=False)
 
     def _read_parts(self) -> None:
-        """What a mesh was divided into for several processors: entities with a parent, of the groups of this one."""
+        """Entities with a parent: parts of a mesh that was divided for several processors, with their groups."""
         self._values(self.size, 1)
         self._values("i4", 2 * count(self._values(self.size, 1)[0], "ghosts"))
         self._read_geometry(parts=True)

@@ -127,7 +127,7 @@ class _Reader:
         return self._unpacked(data[head * (blocks + 3) :], lengths, size)
 
     def _decoded(self, text: bytes, size: int) -> bytes:
-        """As :meth:`_raw`, of base64: of packed data the head is encoded by itself, of others it need not be."""
+        """As :meth:`_raw`, from base64. The head of packed data is encoded by itself; the head of plain data need not be."""
         head = self.header.itemsize
         first = _decode(text, head)
         if not self.packer:

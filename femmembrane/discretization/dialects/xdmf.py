@@ -72,7 +72,7 @@ def _grids(parent: Any) -> Any:
 
 
 def _part(root: Any, grid: Any, name: str) -> Any:
-    """The topology or geometry of a grid, its own or that of a mesh it includes from the same file."""
+    """The topology or geometry of a grid: its own, or the one of a mesh that it includes from the same file."""
     if (own := grid.find(name)) is not None:
         return own
     for element in grid:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.solve.special_points import Segment
+from femmembrane.solve.segment import Segment
 
 from .cases import OGDEN, SCENES, SPECIAL_POINTS, disc_scene
 

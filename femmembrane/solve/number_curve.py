@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from ..errors import SolveError, Status
 from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
-from .branch import BranchProblem
+from .branch import FOLDS, BranchProblem
 from .continuation import BranchPoint, CurveProblem
 from .controls import CONTROLS, Control
 from .newton import TOLERANCE, relative_residual, relative_size
@@ -251,3 +251,44 @@ def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:
     """Value and derivatives of a control with respect to (x, P, m)."""
     gap, row, corner = control.equation(equations.problem.family.space, equations.x, equations.pressure, equations.evaluation)
     return gap, np.concatenate([row, [corner, 0.0]])
+
+
+class ControlledProblem(NumberProblem):
+    """Branches of equilibria over the number while a control is held: pressure, volume, height of the pole, or a gas.
+
+    Parameters
+    ----------
+    control : Control
+        N(x, P) = 0; further parameters as for :class:`NumberProblem`.
+    """
+
+    def __init__(self, family: Family, control: Control, scale: float, bounds: tuple[float, float]) -> None:
+        super().__init__(family, scale, bounds)
+        self.control = control
+        # what is held turns nowhere
+        self.folds = {TURN: NUMBER, **{kind: q for kind, q in FOLDS.items() if type(control) is not CONTROLS[q].at}}
+
+    def at(self, z: Array, borders: Borders) -> Equations:
+        return _Controlled(self, z, borders)
+
+
+class _Controlled(Equations):
+    problem: ControlledProblem
+
+    def linearise(self) -> None:
+        self.gap, self.gap_row = _controlled(self, self.problem.control)
+        self.force_number = self.problem.family.number_derivative(self.x, self.pressure, self.number)
+
+
+def first_controlled(problem: ControlledProblem, x: Array, pressure: float, number: float, direction: int) -> NumberPoint:
+    """The equilibrium next to a guess at the same value of the number, oriented towards larger ones for direction +1.
+
+    Raises
+    ------
+    SolveError
+        When there is none next to it, or the branch turns there.
+    """
+    point = problem.first(x, pressure, number, direction)
+    if point is None:
+        raise SolveError("the start is not near an equilibrium of this scene under the control", status=Status.NOT_CONVERGED)
+    return point

@@ -25,7 +25,7 @@ from ..discretization.space import Space, space_of
 from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
-from ..solve.continuation import first_point
+from ..solve.branch import first_point
 from ..solve.controls import CONTROLS
 from ..solve.finer_space import met_across, solved_in, transferred
 from ..solve.state import State

@@ -69,6 +69,18 @@ class Family(Potential):
         symbols = [data, ca.vertcat(local, mode), ca.vertcat(parameters, q)]
         return Replay(ca.Function("fold", symbols, [ca.densify(ca.vertcat(*rows))], {"cse": True}), self.point_data)
 
+    @cached_property
+    @BUILDING
+    def _number_kernel(self) -> Replay:
+        t, (data, local, parameters) = self.terms, self.symbols
+        rows = ca.jacobian(t["gradient"], parameters[1])  # the volume knows no number
+        return Replay(ca.Function("number", [data, local, parameters], [ca.densify(rows)], {"cse": True}), self.point_data)
+
+    def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
+        """Derivative of E' - P V' with respect to the number, shape (n_free,)."""
+        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))
+        return self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
         space, ne = self.space, self.space.n_elements

@@ -298,11 +298,14 @@ class TraceMemory(PathMemory):
         Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
     unexplained : tuple of str
         Changes of inertia met so far at which no special point was located.
+    known : float
+        Relative size of the last correction of the point from which the next step sets out.
     """
 
     step: float
     regular: int
     unexplained: tuple[str, ...] = ()
+    known: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -321,7 +321,7 @@ def _trace_attributes(memory: PathMemory | None) -> dict[str, Any]:
     if not isinstance(memory, TraceMemory):
         return {}
     unexplained = {"trace_unexplained": json.dumps(memory.unexplained)} if memory.unexplained else {}
-    return {"trace_step": memory.step, "trace_regular": memory.regular, **unexplained}
+    return {"trace_step": memory.step, "trace_regular": memory.regular, "trace_known": memory.known, **unexplained}
 
 
 def read_dataset(path: str | PathLike[str], what: str) -> xarray.Dataset:
@@ -476,7 +476,8 @@ def _memory(dataset: xarray.Dataset) -> PathMemory | None:
     step, regular = float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"])
     if not (len(sigma) and 0 < step < np.inf and 1 <= regular <= dataset.sizes["step"]):
         raise ValueError("the memory of the trace does not belong to it")
-    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained)
+    known = float(dataset.attrs.get("trace_known", 0.0))
+    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained, known)
 
 
 def _jumps(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:

@@ -1,25 +1,27 @@
-"""Pseudo-arc-length continuation: whole branches, stable or not, through limit points and folds.
+"""Pseudo-arc-length continuation: curves of equilibria, stable or not, followed through limit points and folds.
 
-Arc length is measured in the mesh-independent inner product of :func:`.state.inner` (mean square displacement over the reference area plus
-squared pressure, both in units of the membrane's own size), so that a step means the same on every mesh and in every unit of length.
+A curve is the set of roots z of a system with one equation fewer than unknowns. Along a branch of one scene z is (x, P); along a branch
+of a larger system a number of the scene is one more unknown. A :class:`CurveProblem` knows what z is, measures it and corrects predictions
+onto the curve. The steps (:func:`trace_points`) and what lies between two points (:class:`.segment.Segment`) are the same for all curves.
+
+Arc length is measured in a mesh-independent inner product of z, so that a step means the same on every mesh and in every unit of length.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-
-import numpy as np
+from typing import Generic, TypeVar
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
-from .banded import BorderedFactor, band_product
-from .controls import CONTROLS, ArcLengthControl, Controlled
-from .newton import TOLERANCE, correct
-from .state import Predictor, State, inner
+from .controls import CONTROLS, Controlled
+from .newton import TOLERANCE
+from .state import Predictor, State
 
-#: steps so many times the smallest that turn on the spot in a tension field have met a corner
+#: steps so many times the smallest that turn on the spot have met a corner
 CORNER = 100.0
 #: smallest step relative to the arc length so far
 ROUND_OFF = 1e-14
@@ -50,126 +52,187 @@ class StepControl:
 
 @dataclass(slots=True)
 class BranchPoint:
-    """A point of a branch with its unit tangent and the rates of volume, pressure and pole height along it."""
+    """A point of a curve of equilibria.
+
+    Attributes
+    ----------
+    state : State
+        The equilibrium.
+    z : ndarray
+        All unknowns: (x, P), and the number where one of the scene is unknown.
+    tangent, dual : ndarray
+        Unit derivative of z with respect to arc length, and the inner product with it as a row.
+    sigma : float
+        Arc length.
+    """
 
     state: State
-    sigma: float
+    z: Array
     tangent: Array
-    tangent_pressure: float
     dual: Array
-    dual_pressure: float
+    sigma: float
 
-    def rate(self, quantity: str, potential: Potential) -> float:
-        """Derivative of volume, pressure or center_height with respect to arc length: zero at a fold in that quantity."""
-        return self.rate_of(CONTROLS[quantity], potential)
+    def value(self, quantity: str) -> float:
+        """A quantity of the curve by its name: volume, pressure or center_height."""
+        return self.state.value_of(CONTROLS[quantity])
 
-    def rate_of(self, controlled: Controlled, potential: Potential) -> float:
+    def rate(self, quantity: str) -> float:
+        """Derivative of a quantity with respect to arc length: zero at a fold in that quantity."""
+        return self.rate_of(CONTROLS[quantity])
+
+    def rate_of(self, controlled: Controlled) -> float:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
-        return controlled.rate(potential.space, self.state.pressure, self.state.evaluation, self.tangent, self.tangent_pressure)
+        state, n = self.state, len(self.state.x)
+        space = state.evaluation.potential.space
+        return controlled.rate(space, state.pressure, state.evaluation, self.tangent[:n], float(self.tangent[n]))
+
+
+Point = TypeVar("Point", bound=BranchPoint)
+
+
+class CurveProblem(ABC, Generic[Point]):
+    """A system with one equation fewer than unknowns z, the roots of which form a curve.
+
+    Attributes
+    ----------
+    potential : Potential
+    folds : mapping of str to str
+        Kinds of folds of the curve, and the quantity that is stationary at each.
+    units : mapping of str to float
+        Quantities of the curve with their units: an error is judged relative to the quantity and one unit.
+    cornered : bool
+        Whether the curve may have corners, which no shorter step makes round.
+    resolution : float
+        Smallest change of a quantity, relative to its size, that is told from round-off; a fold within less is none.
+    """
+
+    potential: Potential
+    folds: Mapping[str, str]
+    cornered: bool = False
+    resolution: float = 0.0
+
+    @property
+    @abstractmethod
+    def units(self) -> Mapping[str, float]: ...
+
+    @abstractmethod
+    def dual(self, z: Array) -> Array:
+        """The mesh-independent inner product with z, as a row."""
+
+    def norm(self, z: Array) -> float:
+        """Length of z in that inner product."""
+        return math.sqrt(max(float(self.dual(z) @ z), 0.0))
+
+    def predict(self, path: Predictor, point: Point, step: float) -> tuple[float, Array, Array]:
+        """Length of the next step, what the path predicts there, and the row of the hyperplane through it in which it is corrected."""
+        return step, path.predict(point.sigma + step), point.dual
+
+    @abstractmethod
+    def correct(self, guess: Array, row: Array, near: Point) -> tuple[Point | None, int]:
+        """The point of the curve in the hyperplane row . (z - guess) = 0, oriented like a point near by, and the iterations spent.
+
+        None where the corrector does not converge.
+        """
+
+    def resolve(self, guess: Array, row: Array, near: Point) -> Point:
+        """As :meth:`correct`, as exactly as round-off lets it be.
+
+        Raises
+        ------
+        SolveError
+            Where the corrector does not converge.
+        """
+        point, _ = self.correct(guess, row, near)
+        if point is None:
+            raise SolveError("the curve between two neighbouring points could not be resolved", status=Status.NOT_CONVERGED)
+        return point
+
+    @abstractmethod
+    def hold(self, quantity: str, value: float, near: Point) -> Point | None:
+        """The point at which a quantity has a value exactly, corrected from one near by; None where that is singular."""
+
+    def forbids(self, before: Point, after: Point) -> bool:
+        """Whether no curve leads from one point to the other, though a step did."""
+        return False
+
+    def rest_between(self, a: Point, b: Point) -> Point | None:
+        """The state at rest if it lies between two points and no corrector finds it."""
+        return None
+
+    def place(self, point: Point) -> str:
+        """Where a point is, for messages."""
+        return f"V = {point.state.volume:.9g}, P = {point.state.pressure:.9g}"
 
 
 @dataclass(slots=True)
 class Tracer:
-    """Where a trace stands: everything that its next step depends on."""
+    """Where a trace stands: everything that its next step depends on.
+
+    Attributes
+    ----------
+    path : Predictor
+    step : float
+    control : StepControl
+    known : float
+        Relative size of the last correction of the point from which the next step sets out.
+    """
 
     path: Predictor
     step: float
     control: StepControl = field(default_factory=StepControl)
+    known: float = 0.0
 
 
-def first_point(potential: Potential, state: State, direction: int) -> BranchPoint:
-    """The point of a state with its tangent, oriented towards larger volume for direction +1."""
-    border = state.evaluation.volume_gradient
-    tangent, tp = BorderedFactor(state.factor, -border, border, 0.0).solve(np.zeros_like(state.x), 1.0)
-    return unit_point(potential, state, 0.0, direction * tangent, direction * tp)
-
-
-def trace_points(potential: Potential, point: BranchPoint, tracer: Tracer) -> Iterator[BranchPoint]:
-    """Points of the branch beyond ``point``, one a step, for as long as the caller asks.
+def trace_points(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> Iterator[Point]:
+    """Points of the curve beyond ``point``, one a step, for as long as the caller asks.
 
     Raises
     ------
     SolveError
         With status STEP_UNDERFLOW when no step of the smallest length converges.
     """
-    control = tracer.control
-    if not tracer.path.sigma:
-        tracer.path.append(point.sigma, point.state.x, point.state.pressure, point.tangent, point.tangent_pressure)
+    control, path = tracer.control, tracer.path
+    if not path.sigma:
+        path.append(point.sigma, point.z, point.tangent)
+        tracer.known = point.state.correction
     while True:
         spent = 0
         while True:
-            new, iterations, quality = _attempt(potential, point, tracer)
+            new, iterations, quality = _attempt(problem, point, tracer)
             spent += iterations
             if new is not None:
                 break
             tracer.step /= 2
             if tracer.step < max(control.smallest, ROUND_OFF * abs(point.sigma)):  # no shorter one could be told from none
-                raise SolveError(
-                    f"no step longer than {control.smallest:g} converges from V = {point.state.volume:.9g}, P = {point.state.pressure:.9g}",
-                    status=Status.STEP_UNDERFLOW,
-                )
+                message = f"no step longer than {control.smallest:g} converges from {problem.place(point)}"
+                raise SolveError(message, status=Status.STEP_UNDERFLOW)
         new.state.iterations = spent
-        tracer.path.append(new.sigma, new.state.x, new.state.pressure, new.tangent, new.tangent_pressure)
+        tracer.known = new.state.correction
+        path.append(new.sigma, new.z, new.tangent)
         tracer.step = min(max(tracer.step * min(max(quality, 0.5), 2.0), control.smallest), control.largest)
         point = new
         yield new
 
 
-def _attempt(potential: Potential, point: BranchPoint, tracer: Tracer) -> tuple[BranchPoint | None, int, float]:
+def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tuple[Point | None, int, float]:
     """One step of the current length: the new point or None, iterations, and the factor for the next step."""
-    control, step = tracer.control, tracer.step
-    x, p = tracer.path.predict(point.sigma + step)
-    result = correct(potential, ArcLengthControl(point.dual, point.dual_pressure, x, p), x, p)
-    if result.status is not Status.CONVERGED:
-        return None, result.iterations, 0.5
-    miss = math.sqrt(max(_square(potential, result.x - x, result.pressure - p), 0.0)) / step
-    if result.correction > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
-        known = result.correction * math.sqrt(max(_square(potential, result.x, result.pressure), 0.0))
-        miss = max(miss - _BOTH_ENDS * known / step, 0.0)
-    state = State.of(result)
-    if potential.passed_source(point.state.x, state.x):
-        return None, result.iterations, 0.5
-    # the border of this control is the tangent before: the corrector's last factors give the new one for a back-substitution
-    new = unit_point(potential, state, point.sigma, *result.bordered.solve(np.zeros_like(state.x), 1.0)) if result.bordered else None
-    if new is None:
-        return None, result.iterations, 0.5
-    cosine = float(point.dual @ new.tangent + point.dual_pressure * new.tangent_pressure)
+    control = tracer.control
+    step, guess, row = problem.predict(tracer.path, point, tracer.step)
+    new, iterations = problem.correct(guess, row, point)
+    if new is None or problem.forbids(point, new):
+        return None, iterations, 0.5
+    length = max(step, control.smallest)
+    miss = problem.norm(new.z - guess) / length
+    known = max(tracer.known, new.state.correction)
+    if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
+        miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
+    cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
-    chord = math.sqrt(_square(potential, state.x - point.state.x, state.pressure - point.state.pressure))
-    # where the border of a wrinkled zone passes a point the branch has a corner, which no shorter step makes round
-    corner = potential.scene.tension_field and step <= CORNER * control.smallest and chord <= 2 * step and cosine > 0
+    chord = problem.norm(new.z - point.z)
+    # where the border of a wrinkled zone passes a point the branch has a corner
+    corner = problem.cornered and step <= CORNER * control.smallest and chord <= 2 * step and cosine > 0
     if not corner and (angle > 2 * control.turn or miss > 50 * control.deviation):
-        return None, result.iterations, 0.5
+        return None, iterations, 0.5
     half = angle / 2
     new.sigma = point.sigma + chord * (half / math.sin(half) if half else 1.0)  # of the circle through both points with these tangents
-    quality = min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))
-    return new, result.iterations, quality
-
-
-def oriented_point(potential: Potential, state: State, sigma: float, tangent: Array, tangent_pressure: float) -> BranchPoint:
-    """The point of a state whose unit tangent is known."""
-    return BranchPoint(state, sigma, tangent, tangent_pressure, *_dual(potential, tangent, tangent_pressure))
-
-
-def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> BranchPoint:
-    """Unit tangent at a state, oriented like that of a neighbouring point."""
-    bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, neighbour.dual, neighbour.dual_pressure)
-    tangent, tp = bordered.solve(np.zeros_like(state.x), 1.0)
-    return unit_point(potential, state, neighbour.sigma, tangent, tp)
-
-
-def unit_point(potential: Potential, state: State, sigma: float, tangent: Array, tp: float) -> BranchPoint:
-    """The point of a state whose tangent is known up to its length."""
-    size = math.sqrt(_square(potential, tangent, tp))
-    return oriented_point(potential, state, sigma, tangent / size, tp / size)
-
-
-def _dual(potential: Potential, tangent: Array, tangent_pressure: float) -> tuple[Array, float]:
-    """What is multiplied with (x, P) in the inner product of :func:`.state.inner` with a tangent."""
-    square = potential.space.unit**2
-    weighed = band_product(potential.mass, potential.space.half_bandwidth, tangent)
-    return weighed / (potential.area * square), tangent_pressure * square
-
-
-def _square(potential: Potential, dx: Array, dp: float) -> float:
-    return inner(potential, dx, dp, dx, dp)
+    return new, iterations, min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))

@@ -14,11 +14,11 @@ from ..discretization.space import Space
 from ..errors import Status
 from ..potential import Array, Evaluation, Family, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
-from .banded import band_product
-from .continuation import BranchPoint, first_point
+from .branch import BranchProblem, first_point
+from .continuation import BranchPoint
 from .controls import ArcLengthControl, Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, relative_residual
-from .state import State, distance
+from .state import State, distance, joined
 
 #: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
 FAR = 0.2
@@ -55,9 +55,9 @@ def solved_in(
 def met_across(onto: Potential, potential: Potential, point: BranchPoint) -> NewtonResult:
     """Where the branch of another space crosses the plane through a point of a branch, across its tangent; regular at every fold."""
     state = point.state
-    start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent))
-    dual = band_product(onto.mass, onto.space.half_bandwidth, tangent) / (onto.area * onto.space.unit**2)
-    across = ArcLengthControl(dual, point.dual_pressure, start, state.pressure)
+    start, tangent = (transferred(potential.space, y, onto.space) for y in (state.x, point.tangent[:-1]))
+    row = BranchProblem(onto).dual(joined(tangent, float(point.tangent[-1])))
+    across = ArcLengthControl(row[:-1], float(row[-1]), start, state.pressure)
     factor = state.evaluation.factor
     return correct(onto, across, start, state.pressure, magnetic=factor, damped=True, max_iterations=_MAX_ITERATIONS)
 

@@ -10,11 +10,13 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
-from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
+from .branch import FOLDS, BranchProblem, first_point
+from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, VolumeControl
 from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, relative_size
-from .special_points import FOLDS, Located, Segment, branch_points, branches_crossing
+from .segment import Located, Segment
+from .special_points import branch_points, branches_crossing
 from .start import moderate, start_at_volume
 from .state import Predictor, State, at_rest, distance, flat_state
 from .state_resolution import unresolved
@@ -90,7 +92,7 @@ class Search:
             if volumes:
                 self.beyond.append((min(volumes), max(volumes)))
 
-    def _walk(self, segments: Iterator[Segment]) -> list[float]:
+    def _walk(self, segments: Iterator[Segment[BranchPoint]]) -> list[float]:
         """Keep what a branch meets, as far as it is new; the volumes of its points."""
         volumes = []
         for segment in segments:
@@ -103,7 +105,7 @@ class Search:
                 break
         return volumes
 
-    def _meets_known_branch(self, segment: Segment) -> bool:
+    def _meets_known_branch(self, segment: Segment[BranchPoint]) -> bool:
         """Note the branch points on a segment. Whether the branch arrives there on a half of the crossing branch, which is then known."""
         for located in crossings_on(self.potential, segment):
             for crossing in self.crossings:
@@ -117,7 +119,7 @@ class Search:
                 self._remember(located)
         return False
 
-    def _remember(self, located: Located) -> None:
+    def _remember(self, located: Located[BranchPoint]) -> None:
         """Keep a branch point; both halves of the other branch are to be followed."""
         with suppress(SolveError):
             crossing = crossing_at(self.potential, located.point)
@@ -207,37 +209,37 @@ class Search:
         return along / (square * (1 + square))
 
 
-def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator[Segment]:
+def follow(potential: Potential, point: BranchPoint, max_steps: int) -> Iterator[Segment[BranchPoint]]:
     """Segments of a branch until a step fails, the limit is reached, or a tension field is slack and depends on the mesh."""
-    tracer = Tracer(Predictor(), StepControl().first, StepControl())
-    points = trace_points(potential, point, tracer)
+    problem, tracer = BranchProblem(potential), Tracer(Predictor(), StepControl().first, StepControl())
+    points = trace_points(problem, point, tracer)
     for _ in range(max_steps):
         try:
             new = next(points)
         except SolveError:
             return
-        yield Segment(potential, point, new)
+        yield Segment(problem, point, new)
         if is_slack(potential, new.state):
             return
         point = new
 
 
-def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_steps: int) -> Iterator[Segment]:
+def follow_beyond(potential: Potential, crossing: Crossing, direction: int, max_steps: int) -> Iterator[Segment[BranchPoint]]:
     """As :func:`follow`, on a half of the branch that crosses at a branch point."""
     tracer = Tracer(Predictor(), StepControl().first, StepControl())
-    points, point = points_beyond(potential, crossing, direction, tracer), crossing.half(direction)
+    problem, points, point = BranchProblem(potential), points_beyond(potential, crossing, direction, tracer), crossing.half(direction)
     for k in range(max_steps):
         try:
             new = next(points)
         except SolveError:
             return
-        yield Segment(potential, point, new, leaving=k == 0)
+        yield Segment(problem, point, new, leaving=k == 0)
         if is_slack(potential, new.state):
             return
         point = new
 
 
-def crossings_on(potential: Potential, segment: Segment) -> list[Located]:
+def crossings_on(potential: Potential, segment: Segment[BranchPoint]) -> list[Located[BranchPoint]]:
     """The branch points on a segment that can be located. Branch points of folded shapes, which depend on the mesh, are left out."""
     try:
         if not branches_crossing(segment) or all(ill_posed(potential, point.state.evaluation) for point in (segment.a, segment.b)):
@@ -257,7 +259,7 @@ class Limit:
     either was met. What follows depends on the mesh.
     """
 
-    fold: Located | None
+    fold: Located[BranchPoint] | None
     landing: State | None
     ill_posed: State | None = None
     last: State | None = None
@@ -288,10 +290,10 @@ def beyond_limit(
     """
     start = first_point(potential, state, 1)
     here = state.volume if quantity == "volume" else state.pressure
-    if start.rate(quantity, potential) * (load - here) < 0:
+    if start.rate(quantity) * (load - here) < 0:
         start = first_point(potential, state, -1)
     kind = next(k for k, q in FOLDS.items() if q == quantity)
-    fold: Located | None = None
+    fold: Located[BranchPoint] | None = None
     last = state
     for segment in follow(potential, start, max_steps):
         if ill_posed(potential, segment.b.state.evaluation) is not None:
@@ -318,7 +320,7 @@ def beyond_limit(
 
 
 def beyond_crossing(
-    potential: Potential, located: Located, quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
+    potential: Potential, located: Located[BranchPoint], quantity: str, load: float, stable: Callable[[State], bool], max_steps: int = 300
 ) -> State | None:
     """The first stable state at a load on the branch that crosses at a branch point; None if neither half has one."""
     try:
@@ -340,7 +342,7 @@ def beyond_crossing(
 
 def loss_before(
     potential: Potential, state: State, quantity: str, stable: Callable[[State], bool], *, max_steps: int = 300
-) -> Located | None:
+) -> Located[BranchPoint] | None:
     """The branch point or fold at which the branch through an unstable state was stable last; None if the way back has none."""
     kind = next(k for k, q in FOLDS.items() if q == quantity)
     here = state.volume - potential.space.reference_volume

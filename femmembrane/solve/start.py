@@ -22,15 +22,16 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
 from .banded import negative_directions
-from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
+from .branch import BranchProblem, first_point
+from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, ControlKind, Gas, PressureControl, VolumeControl
 from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
 from .newton import NEGLIGIBLE, correct
-from .special_points import Segment
-from .state import Predictor, State, at_rest, flat_state, inner
+from .segment import Segment
+from .state import Predictor, State, at_rest, flat_state
 from .stepping import march
 from .wellposed import ill_posed, is_slack, slackness, unresolved_source
 
@@ -393,7 +394,7 @@ def _along(
 ) -> State | None:
     """The first state at a load, that will do, on the branch through a state; None if there is none within the bounds."""
     point = first_point(potential, state, 1)
-    rises = (load - state.value_of(held)) * point.rate_of(held, potential) >= 0
+    rises = (load - state.value_of(held)) * point.rate_of(held) >= 0
     failure = None
     for direction in (1, -1) if rises else (-1, 1):
         try:
@@ -416,9 +417,9 @@ def _first_met(
     away = abs(point.state.volume - potential.space.reference_volume) / potential.space.units["volume"]
     control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
     tracer = Tracer(Predictor(), control.first * min(1.0, np.sqrt(away)), control)
-    spare = None
-    for _, new in zip(range(_STEPS), trace_points(potential, point, tracer), strict=False):
-        for state in _met(Segment(potential, point, new), held, load, accept):
+    problem, spare = BranchProblem(potential), None
+    for _, new in zip(range(_STEPS), trace_points(problem, point, tracer), strict=False):
+        for state in _met(Segment(problem, point, new), held, load, accept):
             if _well_posed(state):
                 return state
             spare = spare or state
@@ -427,14 +428,14 @@ def _first_met(
         if potential.distance_to_sources(new.state.x) < CONTACT * potential.space.unit or unresolved_source(potential, new.state.x):
             raise SolveError(f"the branch runs into a source at V = {new.state.volume:.6g}", status=Status.DIPOLE_CONTACT)
         point = new
-        size = np.sqrt(inner(potential, new.state.x, new.state.pressure, new.state.x, new.state.pressure))
+        size = problem.norm(new.z)
         if size > HUGE:
             return spare
         tracer.step = min(tracer.step, StepControl.largest * (1 + size))  # in proportion to the membrane
     return spare
 
 
-def _met(segment: Segment, held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
+def _met(segment: Segment[BranchPoint], held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
     """States at the load on a segment that will do."""
     if isinstance(held, Gas):
         yield from _gas_met(segment, held)
@@ -447,7 +448,7 @@ def _met(segment: Segment, held: ControlKind | Gas, load: float, accept: Callabl
             yield met.state
 
 
-def _gas_met(segment: Segment, gas: Gas) -> Iterator[State]:
+def _gas_met(segment: Segment[BranchPoint], gas: Gas) -> Iterator[State]:
     """The state at the amount of a gas between two points of a branch, both of which compress it."""
     ends = (segment.a, segment.b)
     missing = [point.state.value_of(gas) - gas.amount for point in ends]
@@ -455,7 +456,7 @@ def _gas_met(segment: Segment, gas: Gas) -> Iterator[State]:
         return
     share = missing[0] / (missing[0] - missing[1])
     near = segment.at(share) if 0 < share < 1 else segment.b
-    result = correct(segment.potential, gas, near.state.x, near.state.pressure, damped=True)
+    result = correct(segment.problem.potential, gas, near.state.x, near.state.pressure, damped=True)
     if result.status is Status.CONVERGED:
         yield State.of(result)
 

@@ -84,30 +84,29 @@ def distance(potential: Potential, x: Array, y: Array) -> float:
 
 @dataclass(slots=True)
 class Predictor:
-    """The last two points of a path (x, P)(sigma) with their derivatives: predicts by cubic Hermite extrapolation."""
+    """The last two points of a path z(sigma) with their derivatives: predicts by cubic Hermite extrapolation."""
 
     sigma: list[float] = field(default_factory=list)
     point: list[Array] = field(default_factory=list)
     slope: list[Array] = field(default_factory=list)
 
-    def append(self, sigma: float, x: Array, pressure: float, dx: Array, dp: float) -> None:
+    def append(self, sigma: float, z: Array, slope: Array) -> None:
         self.sigma.append(sigma)
-        self.point.append(_joined(x, pressure))
-        self.slope.append(_joined(dx, dp))
+        self.point.append(z)
+        self.slope.append(slope)
         for memory in (self.sigma, self.point, self.slope):
             del memory[:-2]
 
-    def predict(self, sigma: float) -> tuple[Array, float]:
-        """(x, P) at sigma: a cubic through the last two points, or the tangent at the only one."""
+    def predict(self, sigma: float) -> Array:
+        """z at sigma: a cubic through the last two points, or the tangent at the only one."""
         if len(self.sigma) == 1:
-            z = self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
-        else:
-            h = self.sigma[1] - self.sigma[0]
-            z = hermite(self.point[0], h * self.slope[0], self.point[1], h * self.slope[1], (sigma - self.sigma[0]) / h)
-        return z[:-1], float(z[-1])
+            return self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
+        h = self.sigma[1] - self.sigma[0]
+        return hermite(self.point[0], h * self.slope[0], self.point[1], h * self.slope[1], (sigma - self.sigma[0]) / h)
 
 
-def _joined(x: Array, last: float) -> Array:
+def joined(x: Array, last: float) -> Array:
+    """(x, last) as one vector."""
     z = np.empty(len(x) + 1)
     z[:-1], z[-1] = x, last
     return z

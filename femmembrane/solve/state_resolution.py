@@ -18,7 +18,7 @@ from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from .banded import negative_directions
-from .continuation import first_point
+from .branch import first_point
 from .controls import VolumeControl
 from .finer_space import counterpart, met_across, moved, solved_in, transferred
 from .state import State

@@ -16,7 +16,7 @@ from ..potential import Array, Potential
 from .banded import BorderedFactor
 from .controls import Control
 from .newton import NewtonResult, correct
-from .state import Predictor, State, distance
+from .state import Predictor, State, distance, joined
 from .wellposed import apparent, is_slack, slackness
 
 #: largest change that the corrector may make, relative to the step
@@ -72,13 +72,14 @@ def march(
     path = Predictor() if path is None else path
     factor_of = (lambda value: value) if parameter == "magnetic" else (lambda value: magnetic)
     if not path.sigma:
-        path.append(start, state.x, state.pressure, *_slope(potential, state, control_at(start), parameter, start))
+        path.append(start, joined(state.x, state.pressure), joined(*_slope(potential, state, control_at(start), parameter, start)))
     accepted = [state]
     here, step = start, stop - start
     spent = 0
     while here != stop:
         there = stop if abs(stop - here) <= abs(step) * (1 + 1e-12) else here + step
-        x, pressure = path.predict(there)
+        guess = path.predict(there)
+        x, pressure = guess[:-1], float(guess[-1])
         result = corrector(potential, control_at(there), x, pressure, magnetic=factor_of(there))
         spent += result.iterations
         reach = distance(potential, x, accepted[-1].x)
@@ -90,7 +91,7 @@ def march(
             if parameter == "load" and magnetic and potential.passed_source(accepted[-1].x, new.x):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"
                 raise SolveError(message, status=Status.DIPOLE_CONTACT, result=accepted)
-            path.append(there, new.x, new.pressure, *_slope(potential, new, control_at(there), parameter, there))
+            path.append(there, joined(new.x, new.pressure), joined(*_slope(potential, new, control_at(there), parameter, there)))
             accepted.append(new)
             here, spent = there, 0
             step *= 2

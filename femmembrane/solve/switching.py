@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,10 +28,10 @@ from ..discretization.space import HESSIAN_PAIRS
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BorderedFactor, band_inner, band_product
-from .continuation import BranchPoint, Tracer, tangent_at, trace_points, unit_point
-from .controls import ArcLengthControl
-from .newton import TOLERANCE, correct
-from .state import Predictor, State, distance, inner
+from .branch import BranchProblem, corrected, tangent_at, unit_point
+from .continuation import BranchPoint, Tracer, trace_points
+from .newton import TOLERANCE
+from .state import Predictor, State, distance, joined
 
 #: a cubic coefficient this small beside the terms that cancel in it vanishes by symmetry
 SYMMETRIC = 1e-4
@@ -74,10 +74,9 @@ class Crossing:
 
     def side(self, potential: Potential, point: BranchPoint) -> int:
         """Which half of the other branch a nearby point lies on; 0 for one that is nearer to the known branch."""
-        dx, dp = point.state.x - self.known.state.x, point.state.pressure - self.known.state.pressure
-        own, other = _along(self.across, dx, dp), _along(self.across, self.other.tangent, self.other.tangent_pressure)
-        size = math.sqrt(max(inner(potential, dx, dp, dx, dp), 0.0))
-        return 0 if abs(own) < 0.5 * abs(other) * size else int(math.copysign(1, own * other))
+        away = point.z - self.known.z
+        own, other = float(self.across.dual @ away), float(self.across.dual @ self.other.tangent)
+        return 0 if abs(own) < 0.5 * abs(other) * BranchProblem(potential).norm(away) else int(math.copysign(1, own * other))
 
 
 def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
@@ -89,7 +88,7 @@ def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
         When the second derivatives do not single out another branch: more than two cross, or the two touch.
     """
     state = known.state
-    null = unit_point(potential, state, known.sigma, softest(potential, state)[0], 0.0)
+    null = unit_point(potential, state, known.sigma, joined(softest(potential, state)[0], 0.0))
     rest = _across_null(potential, null)
     (a, size_a), (b, size_b), (c, size_c) = (_second(potential, null, *pair) for pair in ((rest, rest), (rest, null), (null, null)))
     pitchfork = abs(c) <= SYMMETRIC * size_c
@@ -99,10 +98,10 @@ def crossing_at(potential: Potential, known: BranchPoint) -> Crossing:
         raise SolveError("the branches that meet there could not be told apart", status=Status.NOT_CONVERGED)
     larger = -(b + math.copysign(math.sqrt(square), b))  # the root without cancellation; the second root follows from their product
     tangents = [_combined(rest, null, alpha, beta) for alpha, beta in ((c, larger), (larger, a))]
-    cosines = [_along(tangent, known.tangent, known.tangent_pressure) for tangent in tangents]
+    cosines = [float(tangent.dual @ known.tangent) for tangent in tangents]
     mine = int(abs(cosines[1]) > abs(cosines[0]))
     own, other = _oriented(tangents[mine], cosines[mine]), tangents[1 - mine]
-    cosine = _along(own, other.tangent, other.tangent_pressure)
+    cosine = float(own.dual @ other.tangent)
     return Crossing(own, _combined(other, own, 1.0, -cosine), _oriented(other, _upwards(potential, other)), pitchfork)
 
 
@@ -116,13 +115,11 @@ def leave(potential: Potential, crossing: Crossing, direction: int, step: float)
     """
     start, border = crossing.half(direction), crossing.across
     for _ in range(_HALVINGS):
-        x, p = start.state.x + step * start.tangent, start.state.pressure + step * start.tangent_pressure
-        result = correct(potential, ArcLengthControl(border.dual, border.dual_pressure, x, p), x, p)
+        guess = start.z + step * start.tangent
+        result = corrected(potential, guess, border.dual)
         if result.status is Status.CONVERGED:
-            dx, dp = result.x - x, result.pressure - p
-            if math.sqrt(max(inner(potential, dx, dp, dx, dp), 0.0)) <= 0.5 * step and not _on_known(
-                potential, crossing, result.x, result.pressure
-            ):
+            z = joined(result.x, result.pressure)
+            if BranchProblem(potential).norm(z - guess) <= 0.5 * step and not _on_known(potential, crossing, z):
                 new = tangent_at(potential, State.of(result), start)
                 new.sigma = start.sigma + step
                 return new
@@ -144,9 +141,10 @@ def points_beyond(potential: Potential, crossing: Crossing, direction: int, trac
     new = leave(potential, crossing, direction, tracer.step)
     tracer.path = Predictor()
     for point in (start, new):
-        tracer.path.append(point.sigma, point.state.x, point.state.pressure, point.tangent, point.tangent_pressure)
+        tracer.path.append(point.sigma, point.z, point.tangent)
+    tracer.known = new.state.correction
     yield new
-    yield from trace_points(potential, new, tracer)
+    yield from trace_points(BranchProblem(potential), new, tracer)
 
 
 def same_crossing(potential: Potential, a: Array, b: Array) -> bool:
@@ -184,30 +182,20 @@ def softest(potential: Potential, state: State) -> tuple[Array, float]:
 
 def _across_null(potential: Potential, null: BranchPoint) -> BranchPoint:
     """The other null vector, with a rate of the pressure: K x = V' P', made regular by a border across phi."""
-    x, _ = BorderedFactor(null.state.factor, null.dual, null.dual, 0.0).solve(null.state.evaluation.volume_gradient, 0.0)
-    return unit_point(potential, null.state, null.sigma, x, 1.0)
+    border = null.dual[:-1]
+    x, _ = BorderedFactor(null.state.factor, border, border, 0.0).solve(null.state.evaluation.volume_gradient, 0.0)
+    return unit_point(potential, null.state, null.sigma, joined(x, 1.0))
 
 
 def _combined(u: BranchPoint, v: BranchPoint, alpha: float, beta: float) -> BranchPoint:
     """The unit vector along alpha u + beta v, both of one point."""
-    return unit_point(
-        u.state.evaluation.potential,
-        u.state,
-        u.sigma,
-        alpha * u.tangent + beta * v.tangent,
-        alpha * u.tangent_pressure + beta * v.tangent_pressure,
-    )
+    return unit_point(u.state.evaluation.potential, u.state, u.sigma, alpha * u.tangent + beta * v.tangent)
 
 
 def _oriented(point: BranchPoint, sign: float) -> BranchPoint:
     """A point with its tangent, or the opposite one where the sign is negative."""
     s = -1.0 if sign < 0 else 1.0
-    return BranchPoint(point.state, point.sigma, s * point.tangent, s * point.tangent_pressure, s * point.dual, s * point.dual_pressure)
-
-
-def _along(point: BranchPoint, x: Array, p: float) -> float:
-    """Inner product of the tangent of a point with (x, P)."""
-    return float(point.dual @ x + point.dual_pressure * p)
+    return replace(point, tangent=s * point.tangent, dual=s * point.dual)
 
 
 def _second(potential: Potential, left: BranchPoint, u: BranchPoint, v: BranchPoint) -> tuple[float, float]:
@@ -216,13 +204,11 @@ def _second(potential: Potential, left: BranchPoint, u: BranchPoint, v: BranchPo
     By the central difference along u of the exact derivative F'[v] = K v - V' v_P.
     """
     space, state = potential.space, left.state
-    u_size, size = float(np.abs(u.tangent).max()), float(max(np.ptp(space.Z), np.ptp(space.R), np.abs(state.x).max()))
+    (ux, up), (vx, vp) = ((p.tangent[:-1], float(p.tangent[-1])) for p in (u, v))
+    u_size, size = float(np.abs(ux).max()), float(max(np.ptp(space.Z), np.ptp(space.R), np.abs(state.x).max()))
     e = _DIFFERENCE * size / u_size
-    phi, direction = (space.at_quadrature(p.tangent).reshape(4, -1) for p in (left, v))
-    forward, backward = (
-        _first(potential.evaluate(state.x + k * u.tangent, state.pressure + k * u.tangent_pressure), phi, direction, v.tangent_pressure)
-        for k in (e, -e)
-    )
+    phi, direction = (space.at_quadrature(y).reshape(4, -1) for y in (left.tangent[:-1], vx))
+    forward, backward = (_first(potential.evaluate(state.x + k * ux, state.pressure + k * up), phi, direction, vp) for k in (e, -e))
     terms = (forward - backward) / (2 * e)
     return float(terms.sum()), float(np.abs(terms).sum())
 
@@ -240,28 +226,25 @@ def _upwards(potential: Potential, point: BranchPoint) -> float:
     """What grows on the first half of a branch: the volume; if it is stationary, the height of the pole; if the pole is held, the height of
     the membrane.
     """
-    border, space = point.state.evaluation.volume_gradient, potential.space
-    rate = border @ point.tangent
-    if abs(rate) > _STATIONARY * (np.abs(border) @ np.abs(point.tangent)):
+    border, space, along = point.state.evaluation.volume_gradient, potential.space, point.tangent[:-1]
+    rate = border @ along
+    if abs(rate) > _STATIONARY * (np.abs(border) @ np.abs(along)):
         return float(rate)
-    largest = np.abs(point.tangent).max()
-    lift = point.rate("center_height", potential)
+    largest = np.abs(along).max()
+    lift = point.rate("center_height")
     if abs(lift) > _STATIONARY * largest:
         return lift
     across = space.fields[1]
     mean = float(point.dual[across].sum())
     if abs(mean) > _STATIONARY * float(np.abs(point.dual[across]).sum()):
         return mean
-    return float(point.tangent[np.argmax(np.abs(point.tangent))])
+    return float(along[np.argmax(np.abs(along))])
 
 
-def _on_known(potential: Potential, crossing: Crossing, x: Array, p: float) -> bool:
+def _on_known(potential: Potential, crossing: Crossing, z: Array) -> bool:
     """Whether a state near the crossing is the state of the known branch at the same distance."""
     known = crossing.known
-    dx = x - known.state.x
-    here, pressure = known.state.x, known.state.pressure
-    share = _along(known, dx, p - pressure)
-    guess, guessed = here + share * known.tangent, pressure + share * known.tangent_pressure
-    control = ArcLengthControl(known.dual, known.dual_pressure, guess, guessed)
-    result = correct(potential, control, guess, guessed, tolerance=math.sqrt(TOLERANCE))
+    here, x = known.state.x, z[:-1]
+    share = float(known.dual @ (z - known.z))
+    result = corrected(potential, known.z + share * known.tangent, known.dual, math.sqrt(TOLERANCE))
     return result.status is Status.CONVERGED and distance(potential, result.x, x) < 0.25 * distance(potential, x, here)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,10 +16,13 @@ from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
 from ..scene.variation import Parameter
 from ..solve import state_resolution, wellposed
-from ..solve.continuation import StepControl
-from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
+from ..solve.branch import FOLDS
+from ..solve.continuation import StepControl, Tracer, trace_points
+from ..solve.fold_curve import KINDS, FoldProblem, first_fold
+from ..solve.number_curve import NUMBER, TURN, NumberPoint
+from ..solve.segment import Located, Segment
 from ..solve.start import CONTACT
-from ..solve.state import State
+from ..solve.state import Predictor
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
 from .state_records import record
@@ -99,9 +102,9 @@ def fold_curve(
     clock = time.perf_counter()
     family = Family(scene, named.vary)
     _check_start(start, family)
-    system = FoldSystem(family, start.kind, high - low)
-    point = first_fold(system, start.equilibrium.state, start.pressure, named.value, direction)
-    following = _Following(system, named, (low, high), [], [], {"setup": time.perf_counter() - clock, "solve": 0.0, "cusps": 0.0})
+    problem = FoldProblem(family, start.kind, high - low, (low, high))
+    point = first_fold(problem, start.equilibrium.state, start.pressure, named.value, direction)
+    following = _Following(problem, named, (low, high), [], [], {"setup": time.perf_counter() - clock, "solve": 0.0, "cusps": 0.0})
     following.add(point)
     status, message, closed = following.follow(point, steps or _STEPS, int(max_steps), ill_posed)
     curve = following.curve(status, message, closed)
@@ -114,98 +117,93 @@ def fold_curve(
 class _Following:
     """A fold curve under way."""
 
-    system: FoldSystem
+    problem: FoldProblem
     parameter: Parameter
     bounds: tuple[float, float]
     found: list[Equilibrium]
     cusps: list[Cusp]
     timings: dict[str, float]
 
-    def follow(self, first: FoldPoint, steps: StepControl, max_steps: int, ill_posed: str) -> tuple[Status, str, bool]:
+    def follow(self, first: NumberPoint, steps: StepControl, max_steps: int, ill_posed: str) -> tuple[Status, str, bool]:
         """Step until a bound is met or the curve closes: status, message (empty if all went well), and whether it closed."""
-        point, points = first, fold_points(self.system, first, self.bounds, steps)
+        point, points = first, trace_points(self.problem, first, Tracer(Predictor(), steps.first, steps))
         for _ in range(max_steps):
             clock = time.perf_counter()
             try:
                 new = next(points)
                 self.timings["solve"] += time.perf_counter() - clock
-                clock, segment = time.perf_counter(), FoldSegment(self.system, point, new)
-                turns = segment.turns()
+                clock, segment = time.perf_counter(), Segment(self.problem, point, new)
+                turns = segment.folds(TURN)
                 self.timings["cusps"] += time.perf_counter() - clock
             except SolveError as error:
                 return *self._ended(error, point), False
             if segment.passes(first):
-                self._add_cusps(t for t in turns if t[0].sigma <= segment.b.sigma)
+                self._add_cusps(t for t in turns if t.point.sigma <= segment.b.sigma)
                 self.found.append(self.found[0])
                 return Status.CONVERGED, "", True
-            beyond = [t for t, _ in turns if not self.bounds[0] <= t.number <= self.bounds[1]]
+            beyond = [t.point.number for t in turns if not self.bounds[0] <= t.point.number <= self.bounds[1]]
             if beyond:
-                bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
-                new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
+                new = segment.crossings(NUMBER, self.bounds[0] if beyond[0] < self.bounds[0] else self.bounds[1])[0]
             scene = self.parameter.scene_at(new.number)
-            unresolved = ill_posed == "stop" and state_resolution.unresolved(self.system.family, self._state(new), scene)
+            unresolved = ill_posed == "stop" and state_resolution.unresolved(self.problem.family, new.state, scene)
             if unresolved:
                 return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
-            self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
+            self._add_cusps(t for t in turns if t.point.sigma <= new.sigma)
             self.add(new)
             if new.number in self.bounds:
                 return Status.CONVERGED, "", False
             bad = wellposed.ill_posed(*self._own(new))
             if bad is not None and ill_posed == "stop":
                 return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh", False
-            if self._clearance(new) < (least := CONTACT * self.system.family.space.unit):
+            if self._clearance(new) < (least := CONTACT * self.problem.family.space.unit):
                 return Status.DIPOLE_CONTACT, f"the membrane came within {least:g} of a source at {self._place(new)}", False
             point = new
         return Status.STEP_LIMIT, f"{max_steps} steps were made without meeting a bound of {self.parameter.name}", False
 
-    def add(self, point: FoldPoint) -> None:
+    def add(self, point: NumberPoint) -> None:
         self.found.append(self._record(point))
 
-    def _add_cusps(self, turns: Iterable[tuple[FoldPoint, float]]) -> None:
-        for point, error in turns:
-            own = point.tangent[-2] if self.system.kind == "limit_point" else point.evaluation.volume_gradient @ point.tangent[:-2]
+    def _add_cusps(self, turns: Iterable[Located[NumberPoint]]) -> None:
+        for turn in turns:
+            own = turn.point.rate(FOLDS[self.problem.kind])
             kind = "cusp" if abs(own) < _STATIONARY else "branch_point"
-            eq = self._record(point)
-            self.cusps.append(Cusp(kind, eq.volume, eq.pressure, eq.center_height, error, eq, value=point.number))
+            eq = self._record(turn.point)
+            self.cusps.append(Cusp(kind, eq.volume, eq.pressure, eq.center_height, turn.error, eq, value=turn.point.number))
 
-    def _record(self, point: FoldPoint) -> Equilibrium:
+    def _record(self, point: NumberPoint) -> Equilibrium:
         potential, evaluation = self._own(point)
-        return record(self.parameter.scene_at(point.number), potential, self._state(point, evaluation))
+        return record(self.parameter.scene_at(point.number), potential, replace(point.state, evaluation=evaluation))
 
-    def _state(self, point: FoldPoint, evaluation: Evaluation | None = None) -> State:
-        known = point.evaluation if evaluation is None else evaluation
-        return State(point.x, point.pressure, known, point.iterations, point.correction, point.residual, gap=0.0)
-
-    def _own(self, point: FoldPoint) -> tuple[Potential, Evaluation]:
+    def _own(self, point: NumberPoint) -> tuple[Potential, Evaluation]:
         """Potential and evaluation of a point: those of its own scene where a finer space must be asked whether a compression is real."""
-        if wellposed.apparent(self.system.family, point.evaluation) is None:
-            return self.system.family, point.evaluation
+        if wellposed.apparent(self.problem.family, point.state.evaluation) is None:
+            return self.problem.family, point.state.evaluation
         potential = potential_of(self.parameter.scene_at(point.number))
-        return potential, potential.evaluate(point.x, point.pressure)
+        return potential, potential.evaluate(point.state.x, point.state.pressure)
 
-    def _clearance(self, point: FoldPoint) -> float:
+    def _clearance(self, point: NumberPoint) -> float:
         """Smallest distance between a node and a source."""
-        space, sources = self.system.family.space, self.parameter.scene_at(point.number).sources
+        space, sources = self.problem.family.space, self.parameter.scene_at(point.number).sources
         s = space.node_parameters()
-        (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(point.x, s)
+        (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(point.state.x, s)
         return min((float(np.sqrt(source.distance_squared(R + u, Z + w).min())) for source in sources), default=np.inf)
 
-    def _ended(self, error: SolveError, point: FoldPoint) -> tuple[Status, str]:
+    def _ended(self, error: SolveError, point: NumberPoint) -> tuple[Status, str]:
         near = self._clearance(point)
-        if near < 50 * CONTACT * self.system.family.space.unit:
+        if near < 50 * CONTACT * self.problem.family.space.unit:
             return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
-        wrinkled = self.system.family.scene.tension_field and not point.evaluation.stress.all()
+        wrinkled = self.problem.family.scene.tension_field and not point.state.evaluation.stress.all()
         hint = "; where zones of wrinkles end a tension field has no third derivatives, which this needs: trace at each value instead"
         return error.status, f"{error}{hint if wrinkled else ''}"
 
-    def _place(self, point: FoldPoint) -> str:
-        return f"{self.parameter.name} = {point.number:.6g} (V = {point.evaluation.volume:.6g}, P = {point.pressure:.6g})"
+    def _place(self, point: NumberPoint) -> str:
+        return f"{self.parameter.name} = {point.number:.6g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
 
     def curve(self, status: Status, message: str, closed: bool) -> FoldCurve:
         values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in self.found])
         pressure, volume, height = (_frozen([getattr(eq, q) for eq in self.found]) for q in ("pressure", "volume", "center_height"))
         return FoldCurve(
-            kind=self.system.kind,
+            kind=self.problem.kind,
             parameter=self.parameter.name,
             values=values,
             pressure=pressure,

@@ -21,7 +21,7 @@ from ..solve.controls import CONTROLS, Gas, control_kind
 from ..solve.minimize import is_minimum, minimize_and_verify
 from ..solve.newton import TOLERANCE, correct
 from ..solve.search import Limit, beyond_crossing, beyond_limit, loss_before
-from ..solve.special_points import ON_FOLD
+from ..solve.segment import ON_FOLD
 from ..solve.start import cold_start, moderate, start_in_gas
 from ..solve.state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from ..solve.state_resolution import refuse_unresolved

@@ -12,9 +12,10 @@ from ..potential import Potential
 from ..results.records import Branch, Equilibrium, PathMemory, SpecialPoint
 from ..results.verdict import Verdict
 from ..scene import Scene
+from ..solve.continuation import BranchPoint
 from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import RESIDUAL, correct, relative_residual
-from ..solve.special_points import Located
+from ..solve.segment import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
 from ..stability.checked_verdict import checked_verdict
@@ -105,8 +106,8 @@ def record(
     )
 
 
-def special_point(scene: Scene, potential: Potential, located: Located, azimuthal: int = 0) -> SpecialPoint:
+def special_point(scene: Scene, potential: Potential, located: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
     """The public record of a located point. A branch point has the direction of its branch, which tells it from the crossing branch."""
     point, eq = located.point, record(scene, potential, located.point.state)
-    tangent = np.append(point.tangent, point.tangent_pressure) if located.kind == "branch_point" else None
+    tangent = point.tangent.copy() if located.kind == "branch_point" else None
     return SpecialPoint(located.kind, eq.volume, eq.pressure, eq.center_height, located.error, eq, azimuthal=azimuthal, tangent=tangent)

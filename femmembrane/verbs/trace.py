@@ -13,13 +13,15 @@ from ..potential import Array, Potential, potential_of
 from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
 from ..scene import QUANTITIES, Scene
 from ..solve import state_resolution, wellposed
-from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
-from ..solve.special_points import FOLDS, Located, Segment, branch_points, branches_crossing
+from ..solve.branch import FOLDS, BranchProblem, first_point, oriented_point
+from ..solve.continuation import BranchPoint, StepControl, Tracer, trace_points
+from ..solve.segment import Located, Segment
+from ..solve.special_points import branch_points, branches_crossing
 from ..solve.start import CONTACT, moderate, start_at_volume
 from ..solve.state import Predictor, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..stability.azimuthal import azimuthal_eigenvalue
-from ..threads import one_thread
+from ..threads import cached_property, one_thread
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import on_chosen_mesh
 from .state_records import OnCheckpoint, OnStep, predictor_of, record, remembered, restore, resume, special_point
@@ -261,6 +263,10 @@ class _Tracing:
     unexplained: list[str] = field(default_factory=list)
     timings: dict[str, float] = field(default_factory=lambda: {"setup": 0.0, "solve": 0.0, "special_points": 0.0, "verdicts": 0.0})
 
+    @cached_property
+    def problem(self) -> BranchProblem:
+        return BranchProblem(self.potential)
+
     @classmethod
     def begin(
         cls,
@@ -332,7 +338,7 @@ class _Tracing:
         if start.tangent is None or start.tangent.shape != (potential.space.n_free + 1,):
             raise InputError("start", "branch_point", "one of the special_points of a branch of this scene is allowed")
         state = restore(potential, start.equilibrium)
-        known = oriented_point(potential, state, 0.0, start.tangent[:-1], float(start.tangent[-1]))
+        known = oriented_point(potential, state, 0.0, start.tangent)
         crossing = crossing_at(potential, known)
         tracing = cls(scene, potential, crossing.half(direction), tracer, [], special, on_step, max_steps, crossing=crossing)
         tracing.points = points_beyond(potential, crossing, direction, tracer)
@@ -347,9 +353,9 @@ class _Tracing:
             raise InputError(
                 "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
             )
-        tracer.path, tracer.step = predictor_of(memory), memory.step
+        tracer.path, tracer.step, tracer.known = predictor_of(memory), memory.step, memory.known
         state = restore(potential, start[memory.regular - 1])
-        point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1][:-1], float(memory.slopes[-1][-1]))
+        point = oriented_point(potential, state, memory.sigma[-1], memory.slopes[-1])
         # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
         found = [eq.in_scene(scene) for eq in start[: memory.regular]]
         special = None
@@ -382,10 +388,10 @@ class _Tracing:
         if self.points is None:
             if ill_posed == "stop" and (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
                 return end
-            self.points = trace_points(self.potential, self.point, self.tracer)
+            self.points = trace_points(self.problem, self.point, self.tracer)
         new = next(self.points)
         self.timings["solve"] += time.perf_counter() - clock
-        segment = Segment(self.potential, self.point, new, leaving=self.crossing is not None and len(self.found) == 1)
+        segment = Segment(self.problem, self.point, new, leaving=self.crossing is not None and len(self.found) == 1)
         met = [point for q, v in targets.items() for point in segment.crossings(q, v)]
         last = min(met, key=lambda p: p.sigma) if met else None
         if unresolved := state_resolution.unresolved(self.potential, (last or new).state):
@@ -429,7 +435,7 @@ class _Tracing:
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.max_steps + 1, new)
 
-    def _look_for_special_points(self, segment: Segment, last: BranchPoint | None) -> BranchPoint | None:
+    def _look_for_special_points(self, segment: Segment[BranchPoint], last: BranchPoint | None) -> BranchPoint | None:
         """Keep the special points before the end of the trace; the branch point at which it set out, if it comes back to that."""
         clock, closing = time.perf_counter(), None
         located = [fold for kind in FOLDS for fold in segment.folds(kind)]
@@ -452,7 +458,7 @@ class _Tracing:
             return False
         return same_crossing(self.potential, self.found[0].state, point.state.x)
 
-    def _look_for_onsets(self, segment: Segment, end: BranchPoint) -> None:
+    def _look_for_onsets(self, segment: Segment[BranchPoint], end: BranchPoint) -> None:
         """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
         before, after = self.found[-2:]
         top = (end.sigma - segment.a.sigma) / segment.length
@@ -467,7 +473,7 @@ class _Tracing:
                 self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))  # type: ignore[union-attr]
                 self.timings["special_points"] += time.perf_counter() - clock
 
-    def _special(self, fold: Located, azimuthal: int = 0) -> SpecialPoint:
+    def _special(self, fold: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
         return special_point(self.scene, self.potential, fold, azimuthal)
 
     def _contact(self, point: BranchPoint) -> bool:
@@ -481,7 +487,9 @@ class _Tracing:
 
     def branch(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
         path = remembered(self.tracer.path, self.potential.space.n_free)
-        memory = TraceMemory(path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained))
+        memory = TraceMemory(
+            path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained), self.tracer.known
+        )
         special = None if self.special is None else tuple(self.special)
         found = tuple(self.found) if found is None else found
         return Branch(self.scene, found, status, message, dict(self.timings), special, memory, solver="newton")

@@ -165,7 +165,7 @@ def true_errors(branch: fm.Branch) -> list[float]:
     """Of P at some states, against four times as many elements of degree 8: at the same volume, at the same height, or across the branch:
     the smallest, as each of these is singular at folds of its own."""
     from femmembrane.potential import potential_of
-    from femmembrane.solve.continuation import first_point
+    from femmembrane.solve.branch import first_point
     from femmembrane.solve.controls import CenterHeightControl, VolumeControl
     from femmembrane.solve.finer_space import met_across, solved_in
     from femmembrane.solve.state import State

@@ -243,6 +243,20 @@ def test_arc_length_passes_along_a_long_bulged_tube(start: float) -> None:
     assert branch[-1].pressure == pytest.approx(0.3810405476707, rel=1e-6)
 
 
+@pytest.mark.parametrize(("start", "more"), [(71.0, 5e-15), (71.0, 8e-15), (71.0, 9e-15), (70.0, 7e-15)])
+def test_round_off_along_a_soft_direction_does_not_end_a_branch(start: float, more: float) -> None:
+    """Points are known to a few 1e-5 there. A step is not to be blamed for the error of the point from which it sets out."""
+    steps = fm.StepControl(first=0.02 * (1 + more))
+    branch = fm.trace(bulging(20.0, 120), start=start, until={"volume": 1600.0}, special_points=False, max_steps=1000, steps=steps)
+    assert branch.status is fm.Status.CONVERGED
+
+
+def test_a_branch_along_a_soft_direction_is_continued_to_the_last_bit() -> None:
+    scene = bulging(20.0, 120)
+    whole, part = (fm.trace(scene, start=71.0, special_points=False, max_steps=n) for n in (58, 54))
+    assert [eq.volume for eq in fm.trace(scene, start=part, max_steps=4)] == [eq.volume for eq in whole]
+
+
 # --- a rim that slides ---
 
 

@@ -15,9 +15,9 @@ from femmembrane.errors import InputError, SolveError, Status
 from femmembrane.potential import Family, potential_of
 from femmembrane.results.folds import FoldCurve
 from femmembrane.scene.variation import Parameter, names
-from femmembrane.solve.banded import BandFactor, BorderedFactor, band_product
+from femmembrane.solve.banded import BandFactor, BorderedFactor, WideBorder, band_product
 from femmembrane.solve.continuation import StepControl
-from femmembrane.solve.fold_curve import FoldSegment, WideBorder
+from femmembrane.solve.segment import Segment
 from femmembrane.verbs.folds import fold_curve
 from tests.cases import OGDEN, disc_scene
 
@@ -307,14 +307,14 @@ def test_compressive_stress_ends_the_curve():
 
 def test_a_closed_curve_is_recognised():
     # a circle through (0, 0, 1) with unit speed, in a plain inner product
-    system = SimpleNamespace(norm=np.linalg.norm)
+    problem = SimpleNamespace(norm=np.linalg.norm)
 
     def at(angle):
         tangent = np.array([0.0, np.cos(angle), -np.sin(angle)])
         return SimpleNamespace(z=np.array([0.0, np.sin(angle), np.cos(angle)]), tangent=tangent, dual=tangent, sigma=angle)
 
     start, angles = at(0.0), np.arange(0.0, 7.0, 0.3)
-    passed = [FoldSegment(system, at(a), at(b)).passes(start) for a, b in pairwise(angles)]
+    passed = [Segment(problem, at(a), at(b)).passes(start) for a, b in pairwise(angles)]
     assert np.flatnonzero(passed).tolist() == [20]  # 6.0 to 6.3, around 2 pi
 
 

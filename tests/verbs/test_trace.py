@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.solve.special_points import Segment
+from femmembrane.solve.segment import Segment
 from tests.cases import OGDEN, SCENES, SPECIAL_POINTS, disc_scene
 
 #: name of a scene in tests/data/disc.json -> where a trace starts (a volume) and which pole height it reaches

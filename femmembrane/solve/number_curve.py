@@ -1,0 +1,294 @@
+"""Curves along which a number of the scene changes: roots z = (x, P, m) of equilibrium and one more equation.
+
+With R = E' - P V' and a number m a curve is R(x, P, m) = 0, g(x, P, m) = 0. Where g is that of a control, N(x, P) = 0, it is a branch of
+equilibria over the number (:class:`ControlledProblem`); where g vanishes at a fold it is a curve of folds (:mod:`.fold_curve`).
+Arc length is measured by
+
+    mean of |u|^2 over the reference area + P^2 + (m/scale)^2,
+
+the inner product of :mod:`.state` with the number in units of ``scale``: the same on every mesh.
+
+K is singular along a curve of limit points and at single points of others, so no system is ever solved with it: all of them, of whatever
+border, are reduced to [K, b; b^T, 0] with a mode b of K, which is regular, and a dense matrix of three or four rows. The mode is renewed at
+every point. Cost is linear in the elements.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..errors import SolveError, Status
+from ..potential import Array, Family
+from .banded import BandFactor, BorderedFactor, WideBorder, band_product
+from .branch import FOLDS, BranchProblem
+from .continuation import BranchPoint, CurveProblem
+from .controls import CONTROLS, Control
+from .newton import TOLERANCE, relative_residual, relative_size
+from .state import Predictor, State
+
+#: name of the number among the quantities of a curve, and of a point at which it is stationary among the folds
+NUMBER, TURN = "number", "turn"
+_MAX_ITERATIONS = 12
+#: smallest change of the number, relative to its scale, that is told from round-off: a curve that approaches a value hardly moves in it
+_RESOLUTION = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Borders:
+    """Reference modes of unit length, as rows: ``deflation`` of K, and ``mode`` (with its pressure) of the matrix singular at a fold."""
+
+    deflation: Array
+    mode: Array
+    mode_pressure: float
+
+
+@dataclass(slots=True)
+class NumberPoint(BranchPoint):
+    """A point of a curve in (x, P, m)."""
+
+    borders: Borders
+
+    @property
+    def number(self) -> float:
+        return float(self.z[-1])
+
+    def value(self, quantity: str) -> float:
+        return self.number if quantity == NUMBER else BranchPoint.value(self, quantity)
+
+    def rate(self, quantity: str) -> float:
+        return float(self.tangent[-1]) if quantity == NUMBER else BranchPoint.rate(self, quantity)
+
+
+class Equations:
+    """R and g at one (x, P, m), with what one Newton step needs.
+
+    :meth:`linearise` of a subclass sets ``gap``, the value of g, ``gap_row``, its derivatives, and ``force_number``, that of R with respect
+    to the number.
+    """
+
+    gap: float
+    gap_row: Array
+    force_number: Array
+
+    def __init__(self, problem: NumberProblem, z: Array, borders: Borders) -> None:
+        self.problem, self.z, self.borders = problem, z, borders
+        self.x, self.pressure, self.number = z[:-2], float(z[-2]), float(z[-1])
+        self.evaluation = problem.family.evaluate(self.x, self.pressure, self.number)
+        self.force = self.evaluation.gradient - self.pressure * self.evaluation.volume_gradient
+        self.finite = bool(np.isfinite(self.force).all() and np.isfinite(self.evaluation.stiffness_density).all())
+
+    def factorise(self) -> None:
+        """Factors of [K, b; b^T, 0], the null vector that they give, and g with all derivatives."""
+        self.factor = BandFactor(self.evaluation.band)
+        self.deflated = BorderedFactor(self.factor, self.borders.deflation, self.borders.deflation, 0.0)
+        self.null, self.null_gap = self.deflated.solve(np.zeros_like(self.force), 1.0)
+        self.linearise()
+
+    def linearise(self) -> None:
+        raise NotImplementedError
+
+    def jacobian(self, row: Array) -> WideBorder:
+        """Of (R, g, row . z) with respect to (x, P, m)."""
+        corner = np.stack([self.gap_row[-2:], row[-2:]])
+        return WideBorder(self.deflated, [-self.evaluation.volume_gradient, self.force_number], [self.gap_row[:-2], row[:-2]], corner)
+
+    def renewed(self) -> Borders:
+        """Borders made from the null vectors here: one step of inverse iteration each."""
+        deflation = self.problem.unit_mode(self.null, 0.0)[0]
+        return Borders(deflation, deflation, 0.0)
+
+
+#: the last equation of a point: from (equations, z) to its value there and its row
+_Closing = Callable[[Equations], tuple[float, Array]]
+
+
+class NumberProblem(CurveProblem[NumberPoint]):
+    """Equilibria of a family of scenes with one more equation.
+
+    Parameters
+    ----------
+    family : Family
+    scale : float
+        Unit of the number in arc length.
+    bounds : (float, float)
+        Smallest and largest value of the number: values beyond may not exist, such as a negative strength. A step that would pass a bound
+        ends exactly on it.
+    """
+
+    folds: Mapping[str, str] = {TURN: NUMBER}
+    resolution = _RESOLUTION
+
+    def __init__(self, family: Family, scale: float, bounds: tuple[float, float]) -> None:
+        self.potential = self.family = family
+        self._branch = BranchProblem(family)
+        self.scale, self.bounds = scale, bounds
+
+    @property
+    def units(self) -> Mapping[str, float]:
+        return {**self.family.space.units, NUMBER: self.scale}
+
+    def dual(self, z: Array) -> Array:
+        return np.append(self._branch.dual(z[:-1]), z[-1] / self.scale**2)
+
+    def unit_mode(self, v: Array, q: float) -> tuple[Array, float]:
+        """A mode of displacement and pressure of unit length, as a row."""
+        family = self.family
+        weighed = band_product(family.mass, family.space.half_bandwidth, v) / (family.area * family.space.unit**2)
+        size = np.sqrt(v @ weighed + q * q)
+        return weighed / size, q / float(size)
+
+    def predict(self, path: Predictor, point: NumberPoint, step: float) -> tuple[float, Array, Array]:
+        guess = path.predict(point.sigma + step)
+        low, high = self.bounds
+        if low < guess[-1] < high:
+            return step, guess, point.dual
+        bound = low if guess[-1] <= low else high
+        if (point.number - bound) * (guess[-1] - bound) < 0:
+            step = brentq(lambda s: path.predict(point.sigma + s)[-1] - bound, 0.0, step, xtol=1e-15)
+            guess = path.predict(point.sigma + step)
+        guess[-1] = bound
+        return step, guess, self.number_row
+
+    @property
+    def number_row(self) -> Array:
+        """The row that takes the number out of z."""
+        row = np.zeros(self.family.space.n_free + 2)
+        row[-1] = 1.0
+        return row
+
+    def correct(self, guess: Array, row: Array, near: NumberPoint) -> tuple[NumberPoint | None, int]:
+        point, iterations = self._newton(guess, near.borders, lambda equations: (float(row @ (equations.z - guess)), row), near.dual)
+        if point is not None and not row[:-1].any():
+            point.z[-1] = guess[-1]
+        return point, iterations
+
+    def hold(self, quantity: str, value: float, near: NumberPoint) -> NumberPoint | None:
+        if quantity == NUMBER:
+            guess = near.z.copy()
+            guess[-1] = value
+            return self.correct(guess, self.number_row, near)[0]
+        control = CONTROLS[quantity].at(value)
+        return self._newton(near.z, near.borders, lambda equations: _controlled(equations, control), near.dual)[0]
+
+    def first(self, x: Array, pressure: float, number: float, direction: int) -> NumberPoint | None:
+        """The point next to a guess at the same value of the number, oriented towards larger ones for direction +1."""
+        guess = np.concatenate([x, [pressure, number]])
+        row = self.number_row
+        closing: _Closing = lambda equations: (float(row @ (equations.z - guess)), row)  # noqa: E731
+        return self._newton(guess, self.first_borders(guess), closing, direction * row)[0]
+
+    def first_borders(self, z: Array, sweeps: int = 6) -> Borders:
+        """The mode of K closest to zero, by inverse iteration from the shape of the volume gradient."""
+        equations = self._at_start(z)
+        gradient = equations.evaluation.volume_gradient
+        factor, mode = BandFactor(equations.evaluation.band), gradient
+        for _ in range(sweeps):
+            mode = factor.solve(self.unit_mode(mode, 0.0)[0])
+        deflation = self.unit_mode(mode, 0.0)[0]
+        return Borders(deflation, deflation, 0.0)
+
+    def _at_start(self, z: Array) -> Equations:
+        equations = Equations(self, z, Borders(np.zeros(0), np.zeros(0), 0.0))
+        if not equations.finite:
+            raise SolveError("the start lies outside the domain of the energy", status=Status.NOT_CONVERGED)
+        return equations
+
+    def place(self, point: NumberPoint) -> str:
+        return f"{point.number:.9g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+
+    @abstractmethod
+    def at(self, z: Array, borders: Borders) -> Equations:
+        """The equations at one (x, P, m)."""
+
+    def _newton(self, z: Array, borders: Borders, closing: _Closing, orientation: Array) -> tuple[NumberPoint | None, int]:
+        """Newton's method for R, g and a last equation; None when it does not converge.
+
+        The tangent is that of the curve, oriented so that the row ``orientation`` is positive on it.
+        """
+        previous = np.inf
+        for iteration in range(_MAX_ITERATIONS + 1):
+            equations = self.at(z, borders)
+            if not equations.finite:
+                return None, iteration
+            equations.factorise()
+            try:
+                gap, row = closing(equations)
+                jacobian = equations.jacobian(row)
+                dx, rest = jacobian.solve(-equations.force, [-equations.gap, -gap])
+            except np.linalg.LinAlgError:
+                return None, iteration
+            size = max(
+                relative_size(self.family, dx, z[:-2]),
+                abs(rest[0]) / (self.family.space.units["pressure"] + abs(z[-2])),
+                abs(rest[1]) / max(self.scale, abs(z[-1])),
+            )
+            if size <= TOLERANCE:
+                return self._point(equations, jacobian, iteration, float(size), orientation), iteration
+            if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * TOLERANCE):
+                return None, iteration
+            previous = size
+            z = z + np.concatenate([dx, rest])
+        return None, _MAX_ITERATIONS
+
+    def _point(self, equations: Equations, jacobian: WideBorder, iterations: int, correction: float, orientation: Array) -> NumberPoint:
+        evaluation, pressure = equations.evaluation, equations.pressure
+        residual = relative_residual(self.family, equations.force, evaluation, pressure)
+        state = State(equations.x, pressure, evaluation, iterations, correction, residual, gap=0.0, _factor=equations.factor)
+        dx, rest = jacobian.solve(None, [0.0, 1.0])
+        tangent = np.concatenate([dx, rest])
+        tangent /= self.norm(tangent)
+        if orientation @ tangent < 0:
+            tangent = -tangent
+        return NumberPoint(state, equations.z, tangent, self.dual(tangent), 0.0, equations.renewed())
+
+
+def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:
+    """Value and derivatives of a control with respect to (x, P, m)."""
+    gap, row, corner = control.equation(equations.problem.family.space, equations.x, equations.pressure, equations.evaluation)
+    return gap, np.concatenate([row, [corner, 0.0]])
+
+
+class ControlledProblem(NumberProblem):
+    """Branches of equilibria over the number while a control is held: pressure, volume, height of the pole, or a gas.
+
+    Parameters
+    ----------
+    control : Control
+        N(x, P) = 0; further parameters as for :class:`NumberProblem`.
+    """
+
+    def __init__(self, family: Family, control: Control, scale: float, bounds: tuple[float, float]) -> None:
+        super().__init__(family, scale, bounds)
+        self.control = control
+        # what is held turns nowhere
+        self.folds = {TURN: NUMBER, **{kind: q for kind, q in FOLDS.items() if type(control) is not CONTROLS[q].at}}
+
+    def at(self, z: Array, borders: Borders) -> Equations:
+        return _Controlled(self, z, borders)
+
+
+class _Controlled(Equations):
+    problem: ControlledProblem
+
+    def linearise(self) -> None:
+        self.gap, self.gap_row = _controlled(self, self.problem.control)
+        self.force_number = self.problem.family.number_derivative(self.x, self.pressure, self.number)
+
+
+def first_controlled(problem: ControlledProblem, x: Array, pressure: float, number: float, direction: int) -> NumberPoint:
+    """The equilibrium next to a guess at the same value of the number, oriented towards larger ones for direction +1.
+
+    Raises
+    ------
+    SolveError
+        When there is none next to it, or the branch turns there.
+    """
+    point = problem.first(x, pressure, number, direction)
+    if point is None:
+        raise SolveError("the start is not near an equilibrium of this scene under the control", status=Status.NOT_CONVERGED)
+    return point

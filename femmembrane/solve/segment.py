@@ -1,0 +1,182 @@
+"""What lies between two neighbouring points of a curve: any point, folds, values of a quantity, and roots of functions.
+
+The Hermite cubic through both points, with their tangents, predicts any point; a corrector in the hyperplane across it puts the point on
+the curve. A fold is the root of the rate of its quantity along the curve, found by Brent's method on points that are each converged: the
+rate itself, not the step, decides when it is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic
+
+from scipy.optimize import brentq
+
+from ..errors import SolveError
+from ..potential import Array
+from .continuation import CurveProblem, Point
+from .state import hermite
+
+#: a fold that lies this close to a value, relative to its size and one unit, lies on it
+ON_FOLD = 1e-13
+
+
+@dataclass(slots=True)
+class Located(Generic[Point]):
+    """A special point with the estimated error of its position, relative to the size of the curve's quantities and one unit of each
+    (:attr:`.CurveProblem.units`)."""
+
+    kind: str
+    point: Point
+    error: float
+
+
+class Segment(Generic[Point]):
+    """The curve between two neighbouring points.
+
+    Parameters
+    ----------
+    problem, a, b : CurveProblem, BranchPoint, BranchPoint
+    leaving : bool
+        Whether the first point is a crossing at which the branch was entered: there its own rates and its inertia are round-off, so that
+        nothing is looked for before the second point but given values.
+    """
+
+    def __init__(self, problem: CurveProblem[Point], a: Point, b: Point, *, leaving: bool = False) -> None:
+        self.problem, self.a, self.b, self.leaving = problem, a, b, leaving
+        self.length = b.sigma - a.sigma
+        self._known = {0.0: a, 1.0: b}
+        self._folds: dict[str, list[tuple[float, Located[Point]]]] = {}
+
+    def at(self, share: float) -> Point:
+        """The point of the curve at a share of the arc length between the ends.
+
+        Raises
+        ------
+        SolveError
+            When the corrector does not converge there.
+        """
+        if share not in self._known:
+            a, b = self.a, self.b
+            row = (1 - share) * a.dual + share * b.dual
+            point = self.problem.resolve(self._predicted(share), row, a)
+            point.sigma = a.sigma + share * self.length
+            self._known[share] = point
+        return self._known[share]
+
+    def folds(self, kind: str) -> list[Located[Point]]:
+        """All folds of a kind on the segment: sign changes of the rate, also those that the cubic through the ends shows in pairs."""
+        return [fold for _, fold in self._folds_at(kind)]
+
+    def _folds_at(self, kind: str) -> list[tuple[float, Located[Point]]]:
+        """The folds of a kind with their shares of the segment, located once."""
+        if self.leaving:
+            return []
+        if kind not in self._folds:
+            quantity = self.problem.folds[kind]
+            shares = self._brackets(quantity)
+            rates = [self.at(s).rate(quantity) for s in shares]
+            found = [
+                self._root(kind, lambda point: point.rate(quantity), lo, hi)
+                for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
+                if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
+            ]
+            self._folds[kind] = [fold for fold in found if self._turns(quantity, fold[1].point)]
+        return self._folds[kind]
+
+    def _turns(self, quantity: str, fold: Point) -> bool:
+        """Whether a quantity moves at all between the ends and a fold; else the signs of its rates are round-off."""
+        before, after = self.a.value(quantity), self.b.value(quantity)
+        moved = max(abs(fold.value(quantity) - value) for value in (before, after))
+        return moved >= self.problem.resolution * max(self.problem.units[quantity], abs(before))
+
+    def _brackets(self, quantity: str) -> list[float]:
+        """0, 1, and between them the extremum of the rate where the cubic says that the rate changes sign twice."""
+        r0, r1 = (p.rate(quantity) * self.length for p in (self.a, self.b))
+        rise = self.b.value(quantity) - self.a.value(quantity)
+        # rate of the cubic: r0 (1 - t)(1 - 3t) + r1 t (3t - 2) + 6 rise t (1 - t)
+        a2, a1 = 3 * (r0 + r1 - 2 * rise), -4 * r0 - 2 * r1 + 6 * rise
+        top = -a1 / (2 * a2) if a2 else 0.5
+        if r0 * r1 > 0 and 0.02 < top < 0.98 and (r0 + top * (a1 + top * a2)) * r0 < 0.02 * r0 * r0:
+            return [0.0, float(top), 1.0]
+        return [0.0, 1.0]
+
+    def root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> Located[Point]:
+        """The point between two shares of the segment where a function of the point changes sign."""
+        return self._root(kind, function, low, high)[1]
+
+    def _root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> tuple[float, Located[Point]]:
+        try:
+            share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+        except SolveError:  # another branch crosses at the fold, as where a branch of pears ends on that of the spheres
+            low, high = self.narrowed(function, low, high)
+            return low, Located(kind, self.at(low), (high - low) * self.length + self.spread(low, high))
+        point = self.at(share)
+        h = 1e-3 * (high - low)
+        near = self.at(share + h if share + h < high else share - h)
+        slope = (function(near) - function(point)) / (near.sigma - point.sigma)
+        offset = (abs(function(point) / slope) if slope else self.length) + point.state.correction
+        moved = max(abs(point.rate(q)) * offset / (unit + abs(point.value(q))) for q, unit in self.problem.units.items())
+        return share, Located(kind, point, float(moved + point.state.correction))
+
+    def narrowed(self, function: Callable[[Point], float], low: float, high: float) -> tuple[float, float]:
+        """The shares between which a function of the point changes sign, by bisection as far as points can be resolved."""
+        sign = function(self.at(low)) > 0
+        while high - low > 1e-9:
+            middle = (low + high) / 2
+            try:
+                same = (function(self.at(middle)) > 0) == sign
+            except SolveError:  # next to a crossing the equations are all but singular: what is known is the bracket
+                break
+            low, high = (middle, high) if same else (low, middle)
+        return low, high
+
+    def spread(self, low: float, high: float) -> float:
+        """How far two points are apart, relative to one unit and the size, in every quantity of the curve, with the errors of both."""
+        a, b = self.at(low), self.at(high)
+        apart = max(abs(a.value(q) - b.value(q)) / (unit + abs(a.value(q))) for q, unit in self.problem.units.items())
+        return float(apart + a.state.correction + b.state.correction)
+
+    def crossings(self, quantity: str, value: float) -> list[Point]:
+        """The points at which a quantity takes a value, in order, each corrected under that control; the first end does not count.
+
+        A fold in the quantity between the ends may lie on either side of the value, or on it, within round-off: then it is the point.
+        """
+        kind = next(k for k, q in self.problem.folds.items() if q == quantity)
+        shares = [0.0, *(share for share, _ in self._folds_at(kind)), 1.0]
+        ends = [self.at(s).value(quantity) - value for s in shares]
+        least = ON_FOLD * (self.problem.units[quantity] + abs(value))
+        ends = [ends[0], *(0.0 if abs(e) <= least else e for e in ends[1:-1]), ends[-1]]
+        return [
+            self.at(high) if b == 0 and high != 1.0 else self._crossing(quantity, value, low, high)
+            for low, high, a, b in zip(shares, shares[1:], ends, ends[1:], strict=False)
+            if b == 0 or a * b < 0
+        ]
+
+    def _crossing(self, quantity: str, value: float, low: float, high: float) -> Point:
+        if value == 0 and (rest := self.problem.rest_between(self.a, self.b)) is not None:
+            a, b = self.a.value(quantity), self.b.value(quantity)
+            rest.sigma = self.a.sigma + self.length * a / (a - b)
+            return rest
+        share = brentq(lambda s: self.at(s).value(quantity) - value, low, high, xtol=1e-14, rtol=8.9e-16, disp=False)
+        point = self.at(share)
+        held = self.problem.hold(quantity, value, point)
+        if held is None:  # so close to a fold that the control is singular
+            return point
+        held.sigma = point.sigma
+        # next to a fold the corrector may have ended on its other side
+        return held if held.rate(quantity) * point.rate(quantity) > 0 else point
+
+    def passes(self, start: Point) -> bool:
+        """Whether the curve comes back to its first point here."""
+        before, after = start.dual @ (self.a.z - start.z), start.dual @ (self.b.z - start.z)
+        if self.a.sigma == start.sigma or not before < 0 <= after:
+            return False
+        guess = self._predicted(float(before / (before - after)))
+        return self.problem.norm(guess - start.z) < 0.05 * self.length
+
+    def _predicted(self, share: float) -> Array:
+        """What the cubic through both ends predicts."""
+        a, b = self.a, self.b
+        return hermite(a.z, a.tangent * self.length, b.z, b.tangent * self.length, share)

@@ -23,7 +23,7 @@ from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
 from .banded import negative_directions
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
-from .controls import CONTROLS, Control, ControlKind, Gas, PressureControl, VolumeControl
+from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, PressureControl, VolumeControl
 from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
@@ -57,14 +57,14 @@ def moderate(potential: Potential) -> float:
     return max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
 
 
-def cold_start(potential: Potential, quantity: str, load: float, *, stable: bool = True) -> State:
-    """The equilibrium at a load of any control in :data:`.CONTROLS`.
+def cold_start(potential: Potential, held: Controlled, load: float, *, stable: bool = True) -> State:
+    """The equilibrium at a load of any control in :data:`.CONTROLS`, or with an amount of gas.
 
     Parameters
     ----------
     potential : Potential
-    quantity : str
-        Public name of what is prescribed.
+    held : Controlled
+        What is prescribed.
     load : float
     stable : bool
         Whether only a stable state will do where a pressure is prescribed.
@@ -74,9 +74,11 @@ def cold_start(potential: Potential, quantity: str, load: float, *, stable: bool
     SolveError
         When none of the ways arrives.
     """
-    if quantity == "pressure":
+    if isinstance(held, Gas):
+        return start_in_gas(potential, held.at(load))
+    if held is CONTROLS["pressure"]:
         return start_at_pressure(potential, load, stable=stable)
-    return (start_at_volume if quantity == "volume" else start_at_height)(potential, load)
+    return (start_at_volume if held is CONTROLS["volume"] else start_at_height)(potential, load)
 
 
 def start_at_volume(potential: Potential, volume: float) -> State:
@@ -87,7 +89,7 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     SolveError
         When none of the ways arrives.
     """
-    if at_rest(potential, "volume", volume):
+    if at_rest(potential, CONTROLS["volume"], volume):
         return flat_state(potential)
     if not potential.surrounded:
         return _inflated(potential, volume)
@@ -321,7 +323,7 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
     SolveError
         When none of the ways arrives.
     """
-    if at_rest(potential, "pressure", pressure):
+    if at_rest(potential, CONTROLS["pressure"], pressure):
         flat = flat_state(potential)
         if not potential.surrounded or _is_minimum(flat):
             return flat
@@ -344,7 +346,7 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
 
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
-    if at_rest(potential, "center_height", height):
+    if at_rest(potential, CONTROLS["center_height"], height):
         return flat_state(potential)
     sides = _sides(height - potential.space.first_height * (not potential.flat))
     size = moderate(potential)
@@ -356,6 +358,8 @@ def start_at_height(potential: Potential, height: float) -> State:
 
 def start_in_gas(potential: Potential, gas: Gas) -> State:
     """The equilibrium with an amount of gas behind the membrane, on the branch through the moderately inflated one."""
+    if at_rest(potential, gas, gas.amount):
+        return flat_state(potential)
     sides = _sides(gas.pressure(potential.space.reference_volume))
     ways = _ways_from(potential, gas, gas.amount, moderate(potential), sides)
     return _first_of(ways, f"an amount of gas of {gas.amount:.6g}")

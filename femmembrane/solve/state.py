@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, band_inner
-from .controls import CONTROLS, Controlled, PressureControl
+from .controls import Controlled, PressureControl
 from .newton import NewtonResult, correct
 
 
@@ -59,9 +59,9 @@ def rests_flat(potential: Potential) -> bool:
     return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
 
 
-def at_rest(potential: Potential, quantity: str, load: float) -> bool:
+def at_rest(potential: Potential, held: Controlled, load: float) -> bool:
     """Whether the membrane at rest is an equilibrium at a load: one without stiffness, which no path leaves or passes."""
-    return load == CONTROLS[quantity].rest(potential.space) and rests_flat(potential)
+    return load == held.rest(potential.space) and rests_flat(potential)
 
 
 def flat_state(potential: Potential) -> State:

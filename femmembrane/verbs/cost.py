@@ -275,7 +275,7 @@ def _effects(course: Course) -> list[Job]:
 def _recorded(course: Course, scene: Scene) -> Callable[[], Outcome]:
     potential = potential_of(scene)
     try:
-        again = course.step(potential, cold_start(potential, course.control, course.loads[0]))
+        again = course.step(potential, cold_start(potential, CONTROLS[course.control], course.loads[0]))
         previous = record(scene, potential, again("newton", potential))  # lends its modes as the state before does on a branch
     except SolveError as error:
         message = str(error)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,13 @@ from ..results.records import Equilibrium, SpecialPoint
 from ..scene import Scene
 from ..scene.variation import Parameter
 from ..solve import state_resolution, wellposed
+from ..solve.contact import stopped_by_source, touches_source
 from ..solve.continuation import StepControl
 from ..solve.fold_curve import KINDS, FoldPoint, FoldSegment, FoldSystem, first_fold, fold_points
-from ..solve.start import CONTACT
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
+from .running import End, Run
 from .state_records import record
 
 #: rate of the fold's own quantity along the curve below which it counts as stationary too: two folds of this kind merge there
@@ -84,67 +85,113 @@ def fold_curve(
     low, high = _bounds(named, bounds, direction)
     check_ill_posed(ill_posed)
     check_max_steps(max_steps)
-    clock = time.perf_counter()
-    family = Family(scene, named.vary)
-    _check_start(start, family)
-    system = FoldSystem(family, start.kind, high - low)
-    point = first_fold(system, start.equilibrium.state, start.pressure, named.value, direction)
-    following = _Following(system, named, (low, high), [], [], {"setup": time.perf_counter() - clock, "solve": 0.0, "cusps": 0.0})
-    following.add(point)
-    status, message, closed = following.follow(point, steps or _STEPS, int(max_steps), ill_posed)
-    curve = following.curve(status, message, closed)
-    if throw and message:
-        raise SolveError(message, status=status, result=curve)
+    request = FoldRequest(start, named, (low, high), direction, int(max_steps), steps or _STEPS, ill_posed)
+    curve = FoldRun(scene, request).follow()
+    if throw and curve.message:
+        raise SolveError(curve.message, status=curve.status, result=curve)
     return curve
 
 
-@dataclass
-class _Following:
-    """A fold curve under way."""
+@dataclass(frozen=True, eq=False)
+class FoldRequest:
+    """A fold, or a part of its curve, followed while a number of the scene changes.
 
-    system: FoldSystem
+    Attributes
+    ----------
+    start : SpecialPoint
+    parameter : Parameter
+        The number that changes.
+    bounds : (float, float)
+        Its smallest and largest value.
+    direction : {1, -1}
+    max_steps : int
+        Most steps.
+    steps : StepControl
+        Lengths and accuracy of the steps.
+    ill_posed : {"stop", "mark"}
+        What to do where the membrane is compressed or slack.
+    """
+
+    start: SpecialPoint
     parameter: Parameter
     bounds: tuple[float, float]
-    found: list[Equilibrium]
-    cusps: list[Cusp]
-    timings: dict[str, float]
+    direction: int
+    max_steps: int
+    steps: StepControl
+    ill_posed: str
 
-    def follow(self, first: FoldPoint, steps: StepControl, max_steps: int, ill_posed: str) -> tuple[Status, str, bool]:
-        """Step until a bound is met or the curve closes: status, message (empty if all went well), and whether it closed."""
-        point, points = first, fold_points(self.system, first, self.bounds, steps)
-        for _ in range(max_steps):
-            clock = time.perf_counter()
-            try:
-                new = next(points)
-                self.timings["solve"] += time.perf_counter() - clock
-                clock, segment = time.perf_counter(), FoldSegment(self.system, point, new)
+
+class FoldRun(Run[FoldCurve]):
+    """A fold curve under way.
+
+    Attributes
+    ----------
+    system : FoldSystem
+        The equations of the fold.
+    point : FoldPoint
+        The last point.
+    cusps : list of Cusp
+        Where two folds merge, so far.
+    closed : bool
+        Whether the curve came back to where it set out.
+    """
+
+    def __init__(self, scene: Scene, request: FoldRequest) -> None:
+        clock, start = time.perf_counter(), request.start
+        family = Family(scene, request.parameter.vary)
+        super().__init__(scene, family, ("setup", "solve", "cusps"))
+        _check_start(start, family)
+        self.request, self.parameter, self.bounds = request, request.parameter, request.bounds
+        self.system = FoldSystem(family, start.kind, self.bounds[1] - self.bounds[0])
+        self.point = first_fold(self.system, start.equilibrium.state, start.pressure, self.parameter.value, request.direction)
+        self.cusps: list[Cusp] = []
+        self.closed, self.made = False, 0
+        self.timings["setup"] = time.perf_counter() - clock
+        self._first, self._points = self.point, fold_points(self.system, self.point, self.bounds, request.steps)
+        self.add(self.point)
+
+    def step(self) -> End | None:
+        if self.made == self.request.max_steps:
+            return Status.STEP_LIMIT, f"{self.made} steps were made without meeting a bound of {self.parameter.name}"
+        self.made += 1
+        try:
+            with self.timed("solve"):
+                new = next(self._points)
+            with self.timed("cusps"):
+                segment = FoldSegment(self.system, self.point, new)
                 turns = segment.turns()
-                self.timings["cusps"] += time.perf_counter() - clock
-            except SolveError as error:
-                return *self._ended(error, point), False
-            if segment.passes(first):
-                self._add_cusps(t for t in turns if t[0].sigma <= segment.b.sigma)
-                self.found.append(self.found[0])
-                return Status.CONVERGED, "", True
-            beyond = [t for t, _ in turns if not self.bounds[0] <= t.number <= self.bounds[1]]
-            if beyond:
-                bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
-                new = segment.crossing(bound, (beyond[0].sigma - point.sigma) / segment.length)
-            scene = self.parameter.scene_at(new.number)
-            unresolved = ill_posed == "stop" and state_resolution.unresolved(self.system.family, self._state(new), scene)
-            if unresolved:
-                return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
-            self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
-            self.add(new)
-            if new.number in self.bounds:
-                return Status.CONVERGED, "", False
-            bad = wellposed.ill_posed(*self._own(new))
-            if bad is not None and ill_posed == "stop":
-                return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh", False
-            if self._clearance(new) < (least := CONTACT * self.system.family.space.unit):
-                return Status.DIPOLE_CONTACT, f"the membrane came within {least:g} of a source at {self._place(new)}", False
-            point = new
-        return Status.STEP_LIMIT, f"{max_steps} steps were made without meeting a bound of {self.parameter.name}", False
+        except SolveError as error:
+            return self._ended(error)
+        if segment.passes(self._first):
+            self._add_cusps(t for t in turns if t[0].sigma <= segment.b.sigma)
+            self.found.append(self.found[0])
+            self.closed = True
+            return Status.CONVERGED, ""
+        beyond = [t for t, _ in turns if not self.bounds[0] <= t.number <= self.bounds[1]]
+        if beyond:
+            bound = self.bounds[0] if beyond[0].number < self.bounds[0] else self.bounds[1]
+            new = segment.crossing(bound, (beyond[0].sigma - self.point.sigma) / segment.length)
+        return self._unresolved(new) or self._arrived(new, turns)
+
+    def _unresolved(self, new: FoldPoint) -> End | None:
+        if self.request.ill_posed != "stop":
+            return None
+        unresolved = state_resolution.unresolved(self.system.family, self._state(new), self.parameter.scene_at(new.number))
+        return (Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}") if unresolved else None
+
+    def _arrived(self, new: FoldPoint, turns: Sequence[tuple[FoldPoint, float]]) -> End | None:
+        """Keep a point and what was met on the way to it; the end, if the curve ends there."""
+        self._add_cusps(t for t in turns if t[0].sigma <= new.sigma)
+        self.add(new)
+        if new.number in self.bounds:
+            return Status.CONVERGED, ""
+        bad = wellposed.ill_posed(*self._own(new)) if self.request.ill_posed == "stop" else None
+        if bad is not None:
+            return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh"
+        if touching := touches_source(self._clearance(new), self.potential.space.unit):
+            return Status.DIPOLE_CONTACT, f"{touching} at {self._place(new)}"
+        self.point = new
+        return None
 
     def add(self, point: FoldPoint) -> None:
         self.found.append(self._record(point))
@@ -178,20 +225,20 @@ class _Following:
         (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(point.x, s)
         return min((float(np.sqrt(source.distance_squared(R + u, Z + w).min())) for source in sources), default=np.inf)
 
-    def _ended(self, error: SolveError, point: FoldPoint) -> tuple[Status, str]:
-        near = self._clearance(point)
-        if near < 50 * CONTACT * self.system.family.space.unit:
-            return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
-        wrinkled = self.system.family.scene.tension_field and not point.evaluation.stress.all()
+    def _ended(self, error: SolveError) -> End:
+        if touching := stopped_by_source(error, self._clearance(self.point), self.potential.space.unit):
+            return touching
+        wrinkled = self.scene.tension_field and not self.point.evaluation.stress.all()
         hint = "; where zones of wrinkles end a tension field has no third derivatives, which this needs: trace at each value instead"
         return error.status, f"{error}{hint if wrinkled else ''}"
 
     def _place(self, point: FoldPoint) -> str:
         return f"{self.parameter.name} = {point.number:.6g} (V = {point.evaluation.volume:.6g}, P = {point.pressure:.6g})"
 
-    def curve(self, status: Status, message: str, closed: bool) -> FoldCurve:
-        values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in self.found])
-        pressure, volume, height = (_frozen([getattr(eq, q) for eq in self.found]) for q in ("pressure", "volume", "center_height"))
+    def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> FoldCurve:
+        known = tuple(self.found if found is None else found)
+        values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in known])
+        pressure, volume, height = (_frozen([getattr(eq, q) for eq in known]) for q in ("pressure", "volume", "center_height"))
         return FoldCurve(
             kind=self.system.kind,
             parameter=self.parameter.name,
@@ -200,11 +247,11 @@ class _Following:
             volume=volume,
             center_height=height,
             cusps=tuple(self.cusps),
-            equilibria=tuple(self.found),
-            closed=closed,
+            equilibria=known,
+            closed=self.closed,
             status=status,
             message=message,
-            timings=self.timings,
+            timings=dict(self.timings),
         )
 
 

@@ -22,8 +22,9 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
 from .banded import negative_directions
+from .contact import touches_source
 from .continuation import BranchPoint, StepControl, Tracer, first_point, trace_points
-from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, PressureControl, VolumeControl
+from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, VolumeControl
 from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
@@ -41,8 +42,6 @@ START_VOLUME, START_SHARE = 0.5, 0.12
 NEARLY_FLAT = 0.05
 #: distance to a source, over the size of the membrane, below which a start that fails has run into it
 NEAR = 0.2
-#: distance to a source, over the size of the membrane, at which it counts as touching it
-CONTACT = 1e-3
 #: from this many times that volume a membrane is inflated further if a guess at the wanted volume is too far from its equilibrium
 SAFE = 20.0
 #: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
@@ -160,7 +159,7 @@ def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, 
     if not near and not potential.space.loose:
         first = rest + float(np.copysign(size, volume - rest))
         yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume)
-    yield f"{_GUESS} there", lambda: _held(potential, VolumeControl(volume), volume, 0.0)
+    yield f"{_GUESS} there", lambda: _from_guess(potential, VolumeControl(volume), volume)
 
 
 def _sides(load: float) -> tuple[float, float]:
@@ -209,13 +208,13 @@ def _inflated(potential: Potential, volume: float) -> State:
         potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
     rest = potential.space.reference_volume
     if volume == rest and not potential.flat:
-        return _resting(potential)
+        return flat_state(potential, magnetic=0.0)
     if not (potential.flat or potential.space.lids) and volume * rest < 0:
         return _mirrored(potential, _inflated(potential, -volume), volume)
     failure = spare = None
     for share in _shares(potential, abs(volume - rest)):
         first = rest + share * (volume - rest)
-        state = _guessed(potential, first)
+        state = _from_guess(potential, VolumeControl(first), first, magnetic=0.0)
         if state is not None and not _well_posed(state):
             spare, state = (spare or state) if first == volume else spare, None
         if state is None:
@@ -256,10 +255,6 @@ def _mirrored(potential: Potential, state: State, volume: float) -> State:
     return State.of(result)
 
 
-def _resting(potential: Potential) -> State:
-    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0, magnetic=0.0))
-
-
 def _moved(onto: Potential, state: State, volume: float) -> State | None:
     result = correct(onto, VolumeControl(volume), state.x, state.pressure, damped=True)
     return State.of(result) if result.status is Status.CONVERGED else None
@@ -275,36 +270,31 @@ def _shares(potential: Potential, excess: float) -> Iterator[float]:
     yield from (4.0, 16.0)  # where a tension field is taut
 
 
-def _guessed(potential: Potential, volume: float) -> State | None:
-    """The bare equilibrium next to a guess at a volume."""
-    control = VolumeControl(volume)
+def _from_guess(
+    potential: Potential,
+    control: Control,
+    volume: float,
+    *,
+    pressure: float = 0.0,
+    magnetic: float = 1.0,
+    accept: Callable[[State], bool] | None = None,
+) -> State | None:
+    """An equilibrium under a control from the guess at a volume: by Newton's method, or held by dead forces that fade out.
+
+    Without sources and loads (``magnetic=0.0``) the way downhill is tried between the two; with them it may end in a singularity.
+    """
     with np.errstate(over="ignore", invalid="ignore"):  # a guess may be too large or small for its energy to be a number: not converged
         guess = guess_at_volume(potential, volume)
-        result = correct(potential, control, guess, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
-        if result.status is Status.CONVERGED:
-            return State.of(result)
-        if not np.isfinite(potential.evaluate(guess, 0.0, 0.0).gradient).all():
+        if not np.isfinite(potential.evaluate(guess, pressure, magnetic).gradient).all():
             return None
-        found, p, _, _ = minimize(potential, control, guess, 0.0, magnetic=0.0)  # goes downhill from farther away
-        if np.isfinite(found).all() and np.isfinite(p):
-            result = correct(potential, control, found, p, magnetic=0.0)
-            if result.status is Status.CONVERGED:
-                return State.of(result)
-        return follow_homotopy(Held(potential, control, guess, 0.0, magnetic=0.0), guess, 0.0)
-
-
-def _held(
-    potential: Potential, control: Control, volume: float, pressure: float, accept: Callable[[State], bool] | None = None
-) -> State | None:
-    """An equilibrium under a control from the guess at a volume, with all sources and loads, held by dead forces that fade out."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        guess = guess_at_volume(potential, volume)
-        if not np.isfinite(potential.evaluate(guess, pressure).gradient).all():
-            return None
-        result = correct(potential, control, guess, pressure, damped=True, max_iterations=_CORRECTIONS)
+        result = correct(potential, control, guess, pressure, magnetic=magnetic, damped=True, max_iterations=_CORRECTIONS)
+        if result.status is not Status.CONVERGED and not magnetic:
+            found, p, _, _ = minimize(potential, control, guess, pressure, magnetic=magnetic)
+            if np.isfinite(found).all() and np.isfinite(p):
+                result = correct(potential, control, found, p, magnetic=magnetic)
         if result.status is Status.CONVERGED and (accept is None or accept(State.of(result))):
             return State.of(result)
-        return follow_homotopy(Held(potential, control, guess, pressure), guess, pressure, accept=accept)
+        return follow_homotopy(Held(potential, control, guess, pressure, magnetic=magnetic), guess, pressure, accept=accept)
 
 
 # --- other loads than a volume: the branch through a state at a volume leads there
@@ -388,7 +378,7 @@ def _ways_from(
             guess = rest + side * share * size
             yield (
                 f"{_GUESS} with V = {guess:.6g}",
-                lambda guess=guess: _held(potential, held.at(load), guess, pressure, accept),  # type: ignore[misc]
+                lambda guess=guess: _from_guess(potential, held.at(load), guess, pressure=pressure, accept=accept),  # type: ignore[misc]
             )
 
 
@@ -428,7 +418,8 @@ def _first_met(
             spare = spare or state
         if is_slack(potential, new.state):
             raise slackness(potential, new.state)
-        if potential.distance_to_sources(new.state.x) < CONTACT * potential.space.unit or unresolved_source(potential, new.state.x):
+        touching = touches_source(potential.distance_to_sources(new.state.x), potential.space.unit)
+        if touching or unresolved_source(potential, new.state.x):
             raise SolveError(f"the branch runs into a source at V = {new.state.volume:.6g}", status=Status.DIPOLE_CONTACT)
         point = new
         size = np.sqrt(inner(potential, new.state.x, new.state.pressure, new.state.x, new.state.pressure))

@@ -64,9 +64,12 @@ def at_rest(potential: Potential, held: Controlled, load: float) -> bool:
     return load == held.rest(potential.space) and rests_flat(potential)
 
 
-def flat_state(potential: Potential) -> State:
-    """The membrane at rest: an equilibrium, and where it is flat one without stiffness, which no path leaves or passes."""
-    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0))
+def flat_state(potential: Potential, magnetic: float = 1.0) -> State:
+    """The membrane at rest: an equilibrium, and where it is flat one without stiffness, which no path leaves or passes.
+
+    Where sources or loads pull at it, only without them: ``magnetic=0.0``.
+    """
+    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0, magnetic=magnetic))
 
 
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:

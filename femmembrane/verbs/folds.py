@@ -64,6 +64,7 @@ def fold_curve(
     direction : {1, -1}
         1 sets out towards larger values.
     max_steps : int
+        Most steps.
     steps : StepControl, optional
         Lengths and accuracy of the steps; default those of a trace, but none longer than 0.1.
     ill_posed : {"stop", "mark"}

@@ -171,6 +171,10 @@ def run(
         The last branch that ``on_checkpoint`` was called with, when a run of this scene was interrupted: it is finished, and the result is
         that of an uninterrupted run to the last bit.
 
+    Returns
+    -------
+    Branch
+
     Raises
     ------
     InputError

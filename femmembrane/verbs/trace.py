@@ -49,10 +49,11 @@ def trace(
         1 sets out towards larger volume. From a branch point it names the half of the other branch: 1 that on which the volume grows,
         or where it is stationary, as on both halves of a pitchfork, that on which the pole rises (with the pole held, the membrane).
     max_steps : int
+        Most steps.
     steps : StepControl, optional
         Lengths and accuracy of the steps.
     special_points : bool
-        Locate limit points, volume folds, height folds and branch points.
+        Whether limit points, volume folds, height folds and branch points are located.
     ill_posed : {"stop", "mark"}
         What to do where the meridional stress is compressive, so that the Legendre-Hadamard condition fails and the plain membrane
         has no mesh-independent equilibria, or where a tension field is slack: end there, or go on with that status on every such state.
@@ -76,7 +77,9 @@ def trace(
         carries the branch as ``result``.
     """
     check_scene(scene)
-    request = TraceRequest.checked(start, until, direction, max_steps, steps, special_points, ill_posed)
+    request = TraceRequest.checked(
+        start, until, direction=direction, max_steps=max_steps, steps=steps, ill_posed=ill_posed, special_points=special_points
+    )
     branch = carry_out(on_chosen_mesh(scene, request), on_step=on_step, on_checkpoint=on_checkpoint)
     if throw and branch.message and (until is not None or branch.status is not Status.STEP_LIMIT):
         raise SolveError(branch.message, status=branch.status, result=branch)
@@ -121,7 +124,7 @@ def trace_iter(
         When the first equilibrium is asked for: for an argument that is not allowed, and for a start that cannot be reached.
     """
     check_scene(scene)
-    request = TraceRequest.checked(start, None, direction, max_steps, steps, False, ill_posed)
+    request = TraceRequest.checked(start, None, direction=direction, max_steps=max_steps, steps=steps, ill_posed=ill_posed)
     tracing = one_thread(request.begin)(scene)
     yield tracing.found[0]
     step, known, end = one_thread(tracing.step), 1, None

@@ -63,11 +63,12 @@ class TraceRequest(Request):
         cls,
         start: Start,
         until: Mapping[str, float] | None,
+        *,
         direction: int,
         max_steps: int,
         steps: StepControl | None,
-        special_points: bool,
         ill_posed: str,
+        special_points: bool = False,
     ) -> Self:
         """The request that the arguments of :func:`femmembrane.trace` make, or InputError."""
         targets = checked_targets(until)
@@ -131,16 +132,20 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
     return targets
 
 
+def _of_this_branch(point: SpecialPoint) -> Equilibrium:
+    if point.kind == "azimuthal_onset":
+        message = (
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
+            "folds and equilibria are allowed"
+        )
+        raise InputError("start", "azimuthal_onset", message)
+    return point.equilibrium
+
+
 def _first_state(potential: Potential, start: Start) -> State:
     """The state at a volume, or of an equilibrium, from which a trace sets out."""
     if isinstance(start, SpecialPoint):
-        if start.kind == "azimuthal_onset":
-            message = (
-                f"the states that set in there have {start.azimuthal} wave(s) around the axis and are not computed; branch points, "
-                "folds and equilibria are allowed"
-            )
-            raise InputError("start", "azimuthal_onset", message)
-        start = start.equilibrium
+        start = _of_this_branch(start)
     if isinstance(start, Equilibrium):
         return resume(potential, start)
     if start is None:
@@ -239,9 +244,12 @@ class TraceRun(Run[Branch]):
     def _all_made(self) -> End:
         if self.shortfall is not None:
             return Status.ACCURACY_NOT_MET, str(self.shortfall)
-        if self.unexplained:
-            return Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained)
-        return Status.STEP_LIMIT, f"{self.request.max_steps} steps were made without meeting {dict(self.request.targets) or 'an end'}"
+        message = f"{self.request.max_steps} steps were made without meeting {dict(self.request.targets) or 'an end'}"
+        return self._explained(Status.STEP_LIMIT, message)
+
+    def _explained(self, status: Status, message: str) -> End:
+        """An end, unless a special point that must have been passed was not located."""
+        return (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained)) if self.unexplained else (status, message)
 
     def _step(self) -> End | None:
         clock = time.perf_counter()
@@ -253,18 +261,17 @@ class TraceRun(Run[Branch]):
             new = next(self._points)
         segment = Segment(self.potential, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
         met = [point for q, v in self.request.targets.items() for point in segment.crossings(q, v)]
-        last = min(met, key=lambda p: p.sigma) if met else None
+        last = min(met, key=lambda p: p.sigma, default=None)
         if unresolved := state_resolution.unresolved(self.potential, (last or new).state):
             return Status.NOT_RESOLVED, f"at {self._place(last or new)} {unresolved}"
-        closing = None if self.special is None else self._look_for_special_points(segment, last)
+        closing = self._look_for_special_points(segment, last)
         last = closing or last
         self._add(last or new, clock)
-        if self.special is not None:
-            self._look_for_onsets(segment, last or new)
+        self._look_for_onsets(segment, last or new)
         if closing is not None:
             return Status.CLOSED, f"the branch came back to the branch point V = {closing.state.volume:.6g} at which it set out"
         if last is not None and not wellposed.unresolved_source(self.potential, last.state.x):
-            return (Status.CONVERGED, "") if not self.unexplained else (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained))
+            return self._explained(Status.CONVERGED, "")
         self.point, self.regular = new, len(self.found)
         return self._ill_posed(new) or self._at_source(new)
 
@@ -297,20 +304,24 @@ class TraceRun(Run[Branch]):
 
     def _look_for_special_points(self, segment: Segment, last: BranchPoint | None) -> BranchPoint | None:
         """Keep the special points before the end of the trace; the branch point at which it set out, if it comes back to that."""
-        clock, closing = time.perf_counter(), None
-        located = [fold for kind in FOLDS for fold in segment.folds(kind)]
-        if number := branches_crossing(segment):
-            crossed = branch_points(segment)
-            if len(crossed) < number:
-                a, b = segment.a.state, segment.b.state
-                self.unexplained.append(f"the inertia changes between V = {a.volume:.6g} and {b.volume:.6g} without a located point")
-            located += crossed
-            closing = next((found.point for found in crossed if self._back(found.point, last)), None)
-        for fold in sorted(located, key=lambda f: f.point.sigma):
-            if last is None or fold.point.sigma <= last.sigma:
-                self.special.append(self._special(fold))  # type: ignore[union-attr]
-        self.timings["special_points"] += time.perf_counter() - clock
-        return closing
+        if self.special is None:
+            return None
+        with self.timed("special_points"):
+            located = [fold for kind in FOLDS for fold in segment.folds(kind)]
+            crossed = self._crossed(segment)
+            for fold in sorted(located + crossed, key=lambda f: f.point.sigma):
+                if last is None or fold.point.sigma <= last.sigma:
+                    self.special.append(self._special(fold))
+            return next((found.point for found in crossed if self._back(found.point, last)), None)
+
+    def _crossed(self, segment: Segment) -> list[Located]:
+        """The branch points on a segment; that one is missing is noted."""
+        number = branches_crossing(segment)
+        crossed = branch_points(segment) if number else []
+        if len(crossed) < number:
+            a, b = segment.a.state, segment.b.state
+            self.unexplained.append(f"the inertia changes between V = {a.volume:.6g} and {b.volume:.6g} without a located point")
+        return crossed
 
     def _back(self, point: BranchPoint, last: BranchPoint | None) -> bool:
         """Whether a branch point before the end of the trace is the one at which it set out."""
@@ -320,6 +331,8 @@ class TraceRun(Run[Branch]):
 
     def _look_for_onsets(self, segment: Segment, end: BranchPoint) -> None:
         """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
+        if self.special is None:
+            return
         before, after = self.found[-2:]
         top = (end.sigma - segment.a.sigma) / segment.length
         for n in self.scene.analysis.azimuthal_modes:
@@ -329,9 +342,8 @@ class TraceRun(Run[Branch]):
                 def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
                     return azimuthal_eigenvalue(self.potential, point.state.x, point.state.pressure, n, guess).value
 
-                clock = time.perf_counter()
-                self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))  # type: ignore[union-attr]
-                self.timings["special_points"] += time.perf_counter() - clock
+                with self.timed("special_points"):
+                    self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))
 
     def _special(self, fold: Located, azimuthal: int = 0) -> SpecialPoint:
         return special_point(self.scene, self.potential, fold, azimuthal)

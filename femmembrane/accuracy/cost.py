@@ -184,7 +184,7 @@ class Course:
         self.loads = [load - 2 * direction * step, load - direction * step, load]
         self.control_at = CONTROLS[control].at
         self.potential = potential_of(self.on_mesh(elements, MAX_DEGREE))
-        self.states = self.follow(self.potential, cold_start(self.potential, control, self.loads[0]))
+        self.states = self.follow(self.potential, cold_start(self.potential, CONTROLS[control], self.loads[0]))
         coarser = potential_of(self.on_mesh(max(elements // 2, 1), MAX_DEGREE))
         result = correct(coarser, self.control_at(load), self.interpolate(2, coarser), self.states[2].pressure)
         value = self.quantity(self.states[2])
@@ -238,7 +238,7 @@ class Course:
 
     def cold(self, solver: str, problem: Potential) -> State:
         """The equilibrium without a neighbour, as :func:`femmembrane.equilibrium` finds it."""
-        start = cold_start(problem, self.control, self.load)
+        start = cold_start(problem, CONTROLS[self.control], self.load)
         result = SOLVERS[solver](problem, self.control_at(self.load), start.x, start.pressure)
         if result.status is not Status.CONVERGED:
             raise SolveError("the cold start was not confirmed", status=result.status)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -91,6 +91,11 @@ class Gas:
         For values outside these ranges.
     """
 
+    name: ClassVar[str] = "gas"
+    words: ClassVar[str] = "amount of gas"
+    minimised: ClassVar[bool] = False
+    odd: ClassVar[bool] = False
+
     amount: float
     chamber: float
     atmosphere: float = 0.0
@@ -139,6 +144,16 @@ class Gas:
         total, absolute = evaluation.volume + self.chamber, pressure + self.atmosphere
         return dp * total + absolute * float(evaluation.volume_gradient @ dx)
 
+    def rest(self, space: Space) -> float:
+        """The amount that holds the undeformed membrane."""
+        return self.atmosphere * (space.reference_volume + self.chamber)
+
+    def refusal(self, pressure: float, volume: float) -> str:
+        """Why no amount of the gas holds a state with this pressure and volume; empty where one does."""
+        if (pressure + self.atmosphere) * (volume + self.chamber) > 0 and volume > -self.chamber:
+            return ""
+        return "the start does not compress the gas (P + atmosphere <= 0); start at a larger volume"
+
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         absolute, total = pressure + self.atmosphere, evaluation.volume + self.chamber
         return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
@@ -159,7 +174,26 @@ class ArcLengthControl:
 
 
 class Controlled(Protocol):
-    """A number that a control holds and a branch is followed in: one of :data:`CONTROLS`, or the amount of a :class:`Gas`."""
+    """A number that a control holds and a branch is followed in: one of :data:`CONTROLS`, or the amount of a :class:`Gas`.
+
+    A run from load to load, and the walk along a branch under it, know what is prescribed by this alone.
+    """
+
+    @property
+    def name(self) -> str:
+        """Public name."""
+
+    @property
+    def words(self) -> str:
+        """The name as sentences have it."""
+
+    @property
+    def minimised(self) -> bool:
+        """Whether a minimiser can hold it; other controls take Newton's method."""
+
+    @property
+    def odd(self) -> bool:
+        """Whether the mirror image of a membrane that is flat at rest has the opposite value."""
 
     def at(self, load: float, /) -> Control:
         """The control that holds the number at a load."""
@@ -188,6 +222,12 @@ class Controlled(Protocol):
         dp : float
             The direction (dx, dP).
         """
+
+    def rest(self, space: Space, /) -> float:
+        """The number in the undeformed membrane."""
+
+    def refusal(self, pressure: float, volume: float) -> str:
+        """Why no load of the control holds a state with this pressure and volume; empty where one does."""
 
 
 @dataclass(frozen=True)
@@ -226,6 +266,15 @@ class ControlKind:
     def minimised(self) -> bool:
         """Whether a minimiser can hold it; other controls take Newton's method."""
         return self.name in MINIMISED
+
+    @property
+    def odd(self) -> bool:
+        """Volume, pressure and height of a flat membrane change their signs with it."""
+        return True
+
+    def refusal(self, pressure: float, volume: float) -> str:
+        """Every state has a volume, a pressure and a height."""
+        return ""
 
 
 def _pole_rate(space: Space, pressure: float, evaluation: Evaluation, dx: Array, dp: float) -> float:

@@ -68,7 +68,7 @@ class Search:
 
     def run(self) -> None:
         """Trace the branches through the starts, then deflate until nothing new appears."""
-        if at_rest(self.potential, self.quantity, self.load):
+        if at_rest(self.potential, CONTROLS[self.quantity], self.load):
             self._add(flat_state(self.potential))
         for volume in self.starts:
             try:

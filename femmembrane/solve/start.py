@@ -23,8 +23,9 @@ from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
 from .banded import negative_directions
 from .branch import BranchProblem, first_point
+from .contact import touches_source
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
-from .controls import CONTROLS, Control, ControlKind, Gas, PressureControl, VolumeControl
+from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, VolumeControl
 from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
@@ -42,8 +43,6 @@ START_VOLUME, START_SHARE = 0.5, 0.12
 NEARLY_FLAT = 0.05
 #: distance to a source, over the size of the membrane, below which a start that fails has run into it
 NEAR = 0.2
-#: distance to a source, over the size of the membrane, at which it counts as touching it
-CONTACT = 1e-3
 #: from this many times that volume a membrane is inflated further if a guess at the wanted volume is too far from its equilibrium
 SAFE = 20.0
 #: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
@@ -58,14 +57,14 @@ def moderate(potential: Potential) -> float:
     return max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
 
 
-def cold_start(potential: Potential, quantity: str, load: float, *, stable: bool = True) -> State:
-    """The equilibrium at a load of any control in :data:`.CONTROLS`.
+def cold_start(potential: Potential, held: Controlled, load: float, *, stable: bool = True) -> State:
+    """The equilibrium at a load of any control in :data:`.CONTROLS`, or with an amount of gas.
 
     Parameters
     ----------
     potential : Potential
-    quantity : str
-        Public name of what is prescribed.
+    held : Controlled
+        What is prescribed.
     load : float
     stable : bool
         Whether only a stable state will do where a pressure is prescribed.
@@ -75,9 +74,11 @@ def cold_start(potential: Potential, quantity: str, load: float, *, stable: bool
     SolveError
         When none of the ways arrives.
     """
-    if quantity == "pressure":
+    if isinstance(held, Gas):
+        return start_in_gas(potential, held.at(load))
+    if held is CONTROLS["pressure"]:
         return start_at_pressure(potential, load, stable=stable)
-    return (start_at_volume if quantity == "volume" else start_at_height)(potential, load)
+    return (start_at_volume if held is CONTROLS["volume"] else start_at_height)(potential, load)
 
 
 def start_at_volume(potential: Potential, volume: float) -> State:
@@ -88,7 +89,7 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     SolveError
         When none of the ways arrives.
     """
-    if at_rest(potential, "volume", volume):
+    if at_rest(potential, CONTROLS["volume"], volume):
         return flat_state(potential)
     if not potential.surrounded:
         return _inflated(potential, volume)
@@ -159,7 +160,7 @@ def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, 
     if not near and not potential.space.loose:
         first = rest + float(np.copysign(size, volume - rest))
         yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume)
-    yield f"{_GUESS} there", lambda: _held(potential, VolumeControl(volume), volume, 0.0)
+    yield f"{_GUESS} there", lambda: _from_guess(potential, VolumeControl(volume), volume)
 
 
 def _sides(load: float) -> tuple[float, float]:
@@ -208,13 +209,13 @@ def _inflated(potential: Potential, volume: float) -> State:
         potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
     rest = potential.space.reference_volume
     if volume == rest and not potential.flat:
-        return _resting(potential)
+        return flat_state(potential, magnetic=0.0)
     if not (potential.flat or potential.space.lids) and volume * rest < 0:
         return _mirrored(potential, _inflated(potential, -volume), volume)
     failure = spare = None
     for share in _shares(potential, abs(volume - rest)):
         first = rest + share * (volume - rest)
-        state = _guessed(potential, first)
+        state = _from_guess(potential, VolumeControl(first), first, magnetic=0.0)
         if state is not None and not _well_posed(state):
             spare, state = (spare or state) if first == volume else spare, None
         if state is None:
@@ -255,10 +256,6 @@ def _mirrored(potential: Potential, state: State, volume: float) -> State:
     return State.of(result)
 
 
-def _resting(potential: Potential) -> State:
-    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0, magnetic=0.0))
-
-
 def _moved(onto: Potential, state: State, volume: float) -> State | None:
     result = correct(onto, VolumeControl(volume), state.x, state.pressure, damped=True)
     return State.of(result) if result.status is Status.CONVERGED else None
@@ -274,36 +271,31 @@ def _shares(potential: Potential, excess: float) -> Iterator[float]:
     yield from (4.0, 16.0)  # where a tension field is taut
 
 
-def _guessed(potential: Potential, volume: float) -> State | None:
-    """The bare equilibrium next to a guess at a volume."""
-    control = VolumeControl(volume)
+def _from_guess(
+    potential: Potential,
+    control: Control,
+    volume: float,
+    *,
+    pressure: float = 0.0,
+    magnetic: float = 1.0,
+    accept: Callable[[State], bool] | None = None,
+) -> State | None:
+    """An equilibrium under a control from the guess at a volume: by Newton's method, or held by dead forces that fade out.
+
+    Without sources and loads (``magnetic=0.0``) the way downhill is tried between the two; with them it may end in a singularity.
+    """
     with np.errstate(over="ignore", invalid="ignore"):  # a guess may be too large or small for its energy to be a number: not converged
         guess = guess_at_volume(potential, volume)
-        result = correct(potential, control, guess, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
-        if result.status is Status.CONVERGED:
-            return State.of(result)
-        if not np.isfinite(potential.evaluate(guess, 0.0, 0.0).gradient).all():
+        if not np.isfinite(potential.evaluate(guess, pressure, magnetic).gradient).all():
             return None
-        found, p, _, _ = minimize(potential, control, guess, 0.0, magnetic=0.0)  # goes downhill from farther away
-        if np.isfinite(found).all() and np.isfinite(p):
-            result = correct(potential, control, found, p, magnetic=0.0)
-            if result.status is Status.CONVERGED:
-                return State.of(result)
-        return follow_homotopy(Held(potential, control, guess, 0.0, magnetic=0.0), guess, 0.0)
-
-
-def _held(
-    potential: Potential, control: Control, volume: float, pressure: float, accept: Callable[[State], bool] | None = None
-) -> State | None:
-    """An equilibrium under a control from the guess at a volume, with all sources and loads, held by dead forces that fade out."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        guess = guess_at_volume(potential, volume)
-        if not np.isfinite(potential.evaluate(guess, pressure).gradient).all():
-            return None
-        result = correct(potential, control, guess, pressure, damped=True, max_iterations=_CORRECTIONS)
+        result = correct(potential, control, guess, pressure, magnetic=magnetic, damped=True, max_iterations=_CORRECTIONS)
+        if result.status is not Status.CONVERGED and not magnetic:
+            found, p, _, _ = minimize(potential, control, guess, pressure, magnetic=magnetic)
+            if np.isfinite(found).all() and np.isfinite(p):
+                result = correct(potential, control, found, p, magnetic=magnetic)
         if result.status is Status.CONVERGED and (accept is None or accept(State.of(result))):
             return State.of(result)
-        return follow_homotopy(Held(potential, control, guess, pressure), guess, pressure, accept=accept)
+        return follow_homotopy(Held(potential, control, guess, pressure, magnetic=magnetic), guess, pressure, accept=accept)
 
 
 # --- other loads than a volume: the branch through a state at a volume leads there
@@ -322,7 +314,7 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
     SolveError
         When none of the ways arrives.
     """
-    if at_rest(potential, "pressure", pressure):
+    if at_rest(potential, CONTROLS["pressure"], pressure):
         flat = flat_state(potential)
         if not potential.surrounded or _is_minimum(flat):
             return flat
@@ -345,7 +337,7 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
 
 def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
-    if at_rest(potential, "center_height", height):
+    if at_rest(potential, CONTROLS["center_height"], height):
         return flat_state(potential)
     sides = _sides(height - potential.space.first_height * (not potential.flat))
     size = moderate(potential)
@@ -357,6 +349,8 @@ def start_at_height(potential: Potential, height: float) -> State:
 
 def start_in_gas(potential: Potential, gas: Gas) -> State:
     """The equilibrium with an amount of gas behind the membrane, on the branch through the moderately inflated one."""
+    if at_rest(potential, gas, gas.amount):
+        return flat_state(potential)
     sides = _sides(gas.pressure(potential.space.reference_volume))
     ways = _ways_from(potential, gas, gas.amount, moderate(potential), sides)
     return _first_of(ways, f"an amount of gas of {gas.amount:.6g}")
@@ -385,7 +379,7 @@ def _ways_from(
             guess = rest + side * share * size
             yield (
                 f"{_GUESS} with V = {guess:.6g}",
-                lambda guess=guess: _held(potential, held.at(load), guess, pressure, accept),  # type: ignore[misc]
+                lambda guess=guess: _from_guess(potential, held.at(load), guess, pressure=pressure, accept=accept),  # type: ignore[misc]
             )
 
 
@@ -425,7 +419,8 @@ def _first_met(
             spare = spare or state
         if is_slack(potential, new.state):
             raise slackness(potential, new.state)
-        if potential.distance_to_sources(new.state.x) < CONTACT * potential.space.unit or unresolved_source(potential, new.state.x):
+        touching = touches_source(potential.distance_to_sources(new.state.x), potential.space.unit)
+        if touching or unresolved_source(potential, new.state.x):
             raise SolveError(f"the branch runs into a source at V = {new.state.volume:.6g}", status=Status.DIPOLE_CONTACT)
         point = new
         size = problem.norm(new.z)

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, band_inner
-from .controls import CONTROLS, Controlled, PressureControl
+from .controls import Controlled, PressureControl
 from .newton import NewtonResult, correct
 
 
@@ -59,14 +59,17 @@ def rests_flat(potential: Potential) -> bool:
     return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
 
 
-def at_rest(potential: Potential, quantity: str, load: float) -> bool:
+def at_rest(potential: Potential, held: Controlled, load: float) -> bool:
     """Whether the membrane at rest is an equilibrium at a load: one without stiffness, which no path leaves or passes."""
-    return load == CONTROLS[quantity].rest(potential.space) and rests_flat(potential)
+    return load == held.rest(potential.space) and rests_flat(potential)
 
 
-def flat_state(potential: Potential) -> State:
-    """The membrane at rest: an equilibrium, and where it is flat one without stiffness, which no path leaves or passes."""
-    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0))
+def flat_state(potential: Potential, magnetic: float = 1.0) -> State:
+    """The membrane at rest: an equilibrium, and where it is flat one without stiffness, which no path leaves or passes.
+
+    Where sources or loads pull at it, only without them: ``magnetic=0.0``.
+    """
+    return State.of(correct(potential, PressureControl(0.0), np.zeros(potential.space.n_free), 0.0, magnetic=magnetic))
 
 
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:

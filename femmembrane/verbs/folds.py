@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,14 +17,15 @@ from ..scene import Scene
 from ..scene.variation import Parameter
 from ..solve import state_resolution, wellposed
 from ..solve.branch import FOLDS
+from ..solve.contact import stopped_by_source, touches_source
 from ..solve.continuation import StepControl, Tracer, trace_points
 from ..solve.fold_curve import KINDS, FoldProblem, first_fold
 from ..solve.number_curve import NUMBER, TURN, NumberPoint
 from ..solve.segment import Located, Segment
-from ..solve.start import CONTACT
 from ..solve.state import Predictor
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
+from .running import End, Run
 from .state_records import record
 
 #: rate of the fold's own quantity along the curve below which it counts as stationary too: two folds of this kind merge there
@@ -48,8 +49,8 @@ def fold_curve(
 ) -> FoldCurve:
     """Follow a limit point or a volume fold while a number of the scene changes.
 
-    The curve is followed by arc length in displacement, pressure and number, the number in units of the width of ``bounds``. So it passes
-    the points where two folds merge: it arrives along one fold and leaves along the other.
+    The curve is followed by arc length in displacement, pressure and number (the number in units of the width of ``bounds``), so that it
+    passes the points where two folds merge and comes back on the other one.
 
     Parameters
     ----------
@@ -58,17 +59,17 @@ def fold_curve(
     start : SpecialPoint
         Of kind limit_point or volume_fold, from :func:`femmembrane.trace`.
     parameter : str
-        ``source.K.strength``, ``source.K.height`` (K from 0), ``membrane.susceptibility``, or a number of the material. Ogden's material
-        has ``material.mu.K`` and ``material.alpha.K``, and the sum of mu alpha stays 2: with ``mu`` the other moduli are scaled by one
-        factor, with ``alpha`` the product mu_K alpha_K stays.
+        ``source.K.strength``, ``source.K.height`` (K from 0), ``membrane.susceptibility``, or a number of the material. For Ogden's:
+        ``material.mu.K``, where the other moduli are scaled by one factor, and ``material.alpha.K``, where mu_K alpha_K stays, so that
+        the sum of mu alpha stays 2.
     bounds : (float, float)
         Smallest and largest value; the last point lies exactly on the bound that is met.
     direction : {1, -1}
         1 sets out towards larger values.
     max_steps : int
-        Most steps along the curve.
+        Most steps.
     steps : StepControl, optional
-        Lengths and accuracy of the steps. Default: as for a trace, but no step is longer than 0.1.
+        Lengths and accuracy of the steps; default those of a trace, but none longer than 0.1.
     ill_posed : {"stop", "mark"}
         What to do where the meridional stress is compressive, as for :func:`femmembrane.trace`.
     throw : bool
@@ -81,84 +82,122 @@ def fold_curve(
     Raises
     ------
     InputError, SolveError
-        A SolveError carries the curve up to the failure as ``result``.
-
-    Examples
-    --------
-    The limit point of a Mooney-Rivlin disc, as the material becomes neo-Hookean:
-
-    >>> import femmembrane as fm
-    >>> scene = fm.Scene(material=fm.MooneyRivlin(0.05), mesh=fm.disc(8))
-    >>> limit = fm.trace(scene, until={"volume": 10.0}).special_points[0]
-    >>> curve = fm.fold_curve(scene, start=limit, parameter="material.ratio", bounds=(0.0, 0.06), direction=-1)
-    >>> print(f"P = {curve.pressure[0]:.4f} at {curve.values[0]:.2f}, P = {curve.pressure[-1]:.4f} at {curve.values[-1]:.2f}")
-    P = 2.1605 at 0.05, P = 1.8792 at 0.00
+        The latter carries the curve up to the failure as ``result``.
     """
     check_scene(scene)
     named = Parameter(scene, parameter)
     low, high = _bounds(named, bounds, direction)
     check_ill_posed(ill_posed)
     check_max_steps(max_steps)
-    clock = time.perf_counter()
-    family = Family(scene, named.vary)
-    _check_start(start, family)
-    problem = FoldProblem(family, start.kind, high - low, (low, high))
-    point = first_fold(problem, start.equilibrium.state, start.pressure, named.value, direction)
-    following = _Following(problem, named, (low, high), [], [], {"setup": time.perf_counter() - clock, "solve": 0.0, "cusps": 0.0})
-    following.add(point)
-    status, message, closed = following.follow(point, steps or _STEPS, int(max_steps), ill_posed)
-    curve = following.curve(status, message, closed)
-    if throw and message:
-        raise SolveError(message, status=status, result=curve)
+    request = FoldRequest(start, named, (low, high), direction, int(max_steps), steps or _STEPS, ill_posed)
+    curve = FoldRun(scene, request).follow()
+    if throw and curve.message:
+        raise SolveError(curve.message, status=curve.status, result=curve)
     return curve
 
 
-@dataclass
-class _Following:
-    """A fold curve under way."""
+@dataclass(frozen=True, eq=False)
+class FoldRequest:
+    """A fold, or a part of its curve, followed while a number of the scene changes.
 
-    problem: FoldProblem
+    Attributes
+    ----------
+    start : SpecialPoint
+    parameter : Parameter
+        The number that changes.
+    bounds : (float, float)
+        Its smallest and largest value.
+    direction : {1, -1}
+    max_steps : int
+        Most steps.
+    steps : StepControl
+        Lengths and accuracy of the steps.
+    ill_posed : {"stop", "mark"}
+        What to do where the membrane is compressed or slack.
+    """
+
+    start: SpecialPoint
     parameter: Parameter
     bounds: tuple[float, float]
-    found: list[Equilibrium]
-    cusps: list[Cusp]
-    timings: dict[str, float]
+    direction: int
+    max_steps: int
+    steps: StepControl
+    ill_posed: str
 
-    def follow(self, first: NumberPoint, steps: StepControl, max_steps: int, ill_posed: str) -> tuple[Status, str, bool]:
-        """Step until a bound is met or the curve closes: status, message (empty if all went well), and whether it closed."""
-        point, points = first, trace_points(self.problem, first, Tracer(Predictor(), steps.first, steps))
-        for _ in range(max_steps):
-            clock = time.perf_counter()
-            try:
-                new = next(points)
-                self.timings["solve"] += time.perf_counter() - clock
-                clock, segment = time.perf_counter(), Segment(self.problem, point, new)
+
+class FoldRun(Run[FoldCurve]):
+    """A fold curve under way.
+
+    Attributes
+    ----------
+    problem : FoldProblem
+        The equations of the fold.
+    point : NumberPoint
+        The last point.
+    cusps : list of Cusp
+        Where two folds merge, so far.
+    closed : bool
+        Whether the curve came back to where it set out.
+    """
+
+    def __init__(self, scene: Scene, request: FoldRequest) -> None:
+        clock, start = time.perf_counter(), request.start
+        family = Family(scene, request.parameter.vary)
+        super().__init__(scene, family, ("setup", "solve", "cusps"))
+        _check_start(start, family)
+        self.request, self.parameter, self.bounds = request, request.parameter, request.bounds
+        self.problem = FoldProblem(family, start.kind, self.bounds[1] - self.bounds[0], self.bounds)
+        self.point = first_fold(self.problem, start.equilibrium.state, start.pressure, self.parameter.value, request.direction)
+        self.cusps: list[Cusp] = []
+        self.closed, self.made = False, 0
+        self.timings["setup"] = time.perf_counter() - clock
+        self._first, self._points = (
+            self.point,
+            trace_points(self.problem, self.point, Tracer(Predictor(), request.steps.first, request.steps)),
+        )
+        self.add(self.point)
+
+    def step(self) -> End | None:
+        if self.made == self.request.max_steps:
+            return Status.STEP_LIMIT, f"{self.made} steps were made without meeting a bound of {self.parameter.name}"
+        self.made += 1
+        try:
+            with self.timed("solve"):
+                new = next(self._points)
+            with self.timed("cusps"):
+                segment = Segment(self.problem, self.point, new)
                 turns = segment.folds(TURN)
-                self.timings["cusps"] += time.perf_counter() - clock
-            except SolveError as error:
-                return *self._ended(error, point), False
-            if segment.passes(first):
-                self._add_cusps(t for t in turns if t.point.sigma <= segment.b.sigma)
-                self.found.append(self.found[0])
-                return Status.CONVERGED, "", True
-            beyond = [t.point.number for t in turns if not self.bounds[0] <= t.point.number <= self.bounds[1]]
-            if beyond:
-                new = segment.crossings(NUMBER, self.bounds[0] if beyond[0] < self.bounds[0] else self.bounds[1])[0]
-            scene = self.parameter.scene_at(new.number)
-            unresolved = ill_posed == "stop" and state_resolution.unresolved(self.problem.family, new.state, scene)
-            if unresolved:
-                return Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}", False
-            self._add_cusps(t for t in turns if t.point.sigma <= new.sigma)
-            self.add(new)
-            if new.number in self.bounds:
-                return Status.CONVERGED, "", False
-            bad = wellposed.ill_posed(*self._own(new))
-            if bad is not None and ill_posed == "stop":
-                return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh", False
-            if self._clearance(new) < (least := CONTACT * self.problem.family.space.unit):
-                return Status.DIPOLE_CONTACT, f"the membrane came within {least:g} of a source at {self._place(new)}", False
-            point = new
-        return Status.STEP_LIMIT, f"{max_steps} steps were made without meeting a bound of {self.parameter.name}", False
+        except SolveError as error:
+            return self._ended(error)
+        if segment.passes(self._first):
+            self._add_cusps(t for t in turns if t.point.sigma <= segment.b.sigma)
+            self.found.append(self.found[0])
+            self.closed = True
+            return Status.CONVERGED, ""
+        beyond = [t.point.number for t in turns if not self.bounds[0] <= t.point.number <= self.bounds[1]]
+        if beyond:
+            new = segment.crossings(NUMBER, self.bounds[0] if beyond[0] < self.bounds[0] else self.bounds[1])[0]
+        return self._unresolved(new) or self._arrived(new, turns)
+
+    def _unresolved(self, new: NumberPoint) -> End | None:
+        if self.request.ill_posed != "stop":
+            return None
+        unresolved = state_resolution.unresolved(self.problem.family, new.state, self.parameter.scene_at(new.number))
+        return (Status.NOT_RESOLVED, f"at {self._place(new)} {unresolved}") if unresolved else None
+
+    def _arrived(self, new: NumberPoint, turns: Sequence[Located[NumberPoint]]) -> End | None:
+        """Keep a point and what was met on the way to it; the end, if the curve ends there."""
+        self._add_cusps(t for t in turns if t.point.sigma <= new.sigma)
+        self.add(new)
+        if new.number in self.bounds:
+            return Status.CONVERGED, ""
+        bad = wellposed.ill_posed(*self._own(new)) if self.request.ill_posed == "stop" else None
+        if bad is not None:
+            return bad.status, f"at {self._place(new)} {bad}, and what a mesh finds beyond depends on the mesh"
+        if touching := touches_source(self._clearance(new), self.potential.space.unit):
+            return Status.DIPOLE_CONTACT, f"{touching} at {self._place(new)}"
+        self.point = new
+        return None
 
     def add(self, point: NumberPoint) -> None:
         self.found.append(self._record(point))
@@ -188,20 +227,20 @@ class _Following:
         (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(point.state.x, s)
         return min((float(np.sqrt(source.distance_squared(R + u, Z + w).min())) for source in sources), default=np.inf)
 
-    def _ended(self, error: SolveError, point: NumberPoint) -> tuple[Status, str]:
-        near = self._clearance(point)
-        if near < 50 * CONTACT * self.problem.family.space.unit:
-            return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {near:.2g} of a source"
-        wrinkled = self.problem.family.scene.tension_field and not point.state.evaluation.stress.all()
+    def _ended(self, error: SolveError) -> End:
+        if touching := stopped_by_source(error, self._clearance(self.point), self.potential.space.unit):
+            return touching
+        wrinkled = self.scene.tension_field and not self.point.state.evaluation.stress.all()
         hint = "; where zones of wrinkles end a tension field has no third derivatives, which this needs: trace at each value instead"
         return error.status, f"{error}{hint if wrinkled else ''}"
 
     def _place(self, point: NumberPoint) -> str:
         return f"{self.parameter.name} = {point.number:.6g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
 
-    def curve(self, status: Status, message: str, closed: bool) -> FoldCurve:
-        values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in self.found])
-        pressure, volume, height = (_frozen([getattr(eq, q) for eq in self.found]) for q in ("pressure", "volume", "center_height"))
+    def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> FoldCurve:
+        known = tuple(self.found if found is None else found)
+        values = _frozen([Parameter(eq.scene, self.parameter.name).value for eq in known])
+        pressure, volume, height = (_frozen([getattr(eq, q) for eq in known]) for q in ("pressure", "volume", "center_height"))
         return FoldCurve(
             kind=self.problem.kind,
             parameter=self.parameter.name,
@@ -210,11 +249,11 @@ class _Following:
             volume=volume,
             center_height=height,
             cusps=tuple(self.cusps),
-            equilibria=tuple(self.found),
-            closed=closed,
+            equilibria=known,
+            closed=self.closed,
             status=status,
             message=message,
-            timings=self.timings,
+            timings=dict(self.timings),
         )
 
 

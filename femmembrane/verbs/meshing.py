@@ -1,31 +1,54 @@
-"""The mesh of a scene that names an accuracy in place of elements. It is chosen before anything else is computed."""
+"""The mesh of a scene that names an accuracy instead: chosen before anything is computed."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import SolveError, Status
 from ..potential import potential_of
-from ..results.records import Branch, Equilibrium
+from ..results.records import Equilibrium
 from ..scene import Scene
 from ..solve.finer_space import transferred
 from .arguments import check_scene
 
 if TYPE_CHECKING:
     from ..accuracy.adapt import Shortfall
+    from .running import Request
 
-#: from a scene with a mesh, and a start on it, to the branch that is wanted, or a part of it
-FollowFrom = Callable[[Scene, Equilibrium | None], Branch]
+S = TypeVar("S")
 
 
-def on_chosen_mesh(
-    scene: Scene, start: Equilibrium | None, follow: FollowFrom, control: str
-) -> tuple[Scene, Equilibrium | None, dict[str, float], Shortfall | None]:
-    """The scene with a mesh, the start on that mesh, the seconds that the choice took, and where ``follow`` leaves the accuracy on it. A
-    scene whose mesh is not open is returned as it is.
+@dataclass(frozen=True)
+class Chosen:
+    """A scene with a mesh, and what is asked of it there.
+
+    Attributes
+    ----------
+    scene : Scene
+    request : Request
+        Its start lies on the mesh, and it ends where the accuracy does.
+    timings : mapping of str to float
+        Seconds that the choice took; empty where there was none to make.
+    shortfall : Shortfall or None
+        Where the accuracy ends; None where it is kept all along.
+    """
+
+    scene: Scene
+    request: Request
+    timings: Mapping[str, float] = field(default_factory=dict)
+    shortfall: Shortfall | None = None
+
+
+def on_chosen_mesh(scene: Scene, request: Request) -> Chosen:
+    """Choose the mesh of a scene that names an accuracy, by trial runs of the request; another scene keeps its own.
+
+    Parameters
+    ----------
+    scene : Scene
+    request : Request
 
     Raises
     ------
@@ -36,18 +59,23 @@ def on_chosen_mesh(
     """
     check_scene(scene)
     if not scene.open:
-        return scene, start, {}, None
+        return Chosen(scene, request)
+    kept = request.start_scene
+    if kept is not None and getattr(kept.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
+        return Chosen(scene.replace(mesh=kept.mesh, degree=kept.degree), request)
     clock = time.perf_counter()
     from ..accuracy.adapt import choose_and_check
 
-    chosen, shortfall = choose_and_check(scene, lambda trial: follow(trial, _carried(start, trial)), control)
+    trial = request.trial()
+    chosen, shortfall = choose_and_check(scene, lambda on: trial.on(on).begin(on).follow(), request.errors_at)
     if shortfall is not None and not shortfall.kept:
         raise SolveError(str(shortfall), status=Status.ACCURACY_NOT_MET)
-    return chosen, _carried(start, chosen), {"mesh": time.perf_counter() - clock}, shortfall
+    request = (request if shortfall is None else request.up_to(shortfall.kept)).on(chosen)
+    return Chosen(chosen, request, {"mesh": time.perf_counter() - clock}, shortfall)
 
 
-def _carried(start: Equilibrium | None, scene: Scene) -> Equilibrium | None:
-    """A start on another mesh, as a guess: it is solved again when it is resumed."""
+def carried(start: S, scene: Scene) -> S | Equilibrium:
+    """A start on the mesh of a scene. An equilibrium of another mesh is a guess there: whoever resumes it solves again."""
     if not isinstance(start, Equilibrium):
         return start
     state = transferred(start.potential.space, start.state, potential_of(scene).space)

@@ -42,11 +42,11 @@ def test_an_equilibrium_has_the_value_under_the_public_name(name, state):
     assert kind.rest(potential_of(SCENE).space) == 0  # the flat disc
 
 
-@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("name", ALL)
 def test_cold_starts_hold_what_is_asked(name, state):
-    potential = potential_of(SCENE)
-    found = cold_start(potential, name, getattr(state, name))
-    assert found.value_of(CONTROLS[name]) == pytest.approx(getattr(state, name), rel=1e-10)
+    potential, held = potential_of(SCENE), ALL[name]
+    load = held.value(potential.space, state.state, state.pressure, state.volume)
+    assert cold_start(potential, held, load).value_of(held) == pytest.approx(load, rel=1e-10)
 
 
 def test_the_word_of_scene_files_is_known_beside_the_public_name(state):

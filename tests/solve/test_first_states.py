@@ -1,7 +1,7 @@
 """States that are asked for cold and are known to exist: each is answered, whatever its units, its signs, its supports and its symmetry.
 
-Numbers without another source come from the independent dense walk of :mod:`tests.walker`: small steps from a state that certainly exists, on
-the mesh of the test. :mod:`tests.verification.test_population` asks many more.
+Numbers without another source come from the independent dense walk of :mod:`tests.walker`: small steps from a state that certainly exists,
+on the mesh of the test. :mod:`tests.verification.test_population` asks many more.
 """
 
 from __future__ import annotations

@@ -1,0 +1,183 @@
+"""A run from load to load: what is asked, and how it is stepped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..accuracy.adapt import spread
+from ..checks import LARGEST, choice
+from ..errors import InputError, SolveError, Status
+from ..potential import Array, potential_of
+from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
+from ..scene import MAX_STEPS, Scene
+from ..solve.controls import CONTROLS, ControlKind, Controlled, Gas
+from ..solve.load_path import SOLVERS, LoadPath, Turn
+from ..solve.state import State
+from ..solve.wellposed import slackness
+from .arguments import check_height
+from .meshing import carried
+from .running import End, Request, Run
+from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
+
+AT_LIMIT = ("stop", "jump")
+
+
+@dataclass(frozen=True, eq=False)
+class LoadRequest(Request):
+    """Equilibria at loads of one control, in the order given.
+
+    Attributes
+    ----------
+    held : Controlled
+        What is prescribed.
+    loads : ndarray, shape (number of equilibria,)
+    start : Equilibrium or None
+        A neighbour to start from.
+    solver : {"ipopt", "newton"}
+        Who solves where a minimiser can hold what is prescribed.
+    at_limit : {"stop", "jump"}
+        What to do where the branch turns back before a load.
+    throw : bool
+        Whether the caller raises when a load is not reached. A last state that is slack is then what was asked for.
+    """
+
+    held: Controlled
+    loads: Array
+    start: Equilibrium | None = None
+    solver: str = "ipopt"
+    at_limit: str = "stop"
+    throw: bool = False
+
+    def __post_init__(self) -> None:
+        choice("solver", self.solver, SOLVERS)
+        choice("at_limit", self.at_limit, AT_LIMIT)
+
+    @property
+    def errors_at(self) -> str:
+        return self.held.name
+
+    def on(self, scene: Scene) -> Self:
+        return replace(self, start=carried(self.start, scene))
+
+    def trial(self) -> Self:
+        return replace(self, loads=self.loads[spread(self.loads)], throw=False)
+
+    def up_to(self, count: int) -> Self:
+        return replace(self, loads=self.loads[: spread(self.loads)[count - 1] + 1])
+
+    def begin(self, scene: Scene, on_step: OnStep | None = None) -> LoadRun:
+        run = LoadRun(scene, self, on_step)
+        if self.start is not None:
+            run.set_out(self.start)
+        return run
+
+    def go_on(self, scene: Scene, unfinished: Branch, on_step: OnStep | None = None) -> LoadRun:
+        run = LoadRun(scene, self, on_step)
+        run.go_on(unfinished)
+        return run
+
+
+def checked_loads(key: str, values: ArrayLike) -> Array:
+    """The loads of an argument, one after the other, or InputError."""
+    try:
+        loads = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(key, values, "numbers are allowed") from None
+    if loads.ndim != 1 or not loads.size or not np.isfinite(loads).all():
+        raise InputError(key, values, "one or more finite numbers are allowed")
+    if not (np.abs(loads) <= LARGEST).all():
+        raise InputError(key, values, f"finite numbers are allowed, of a size up to {LARGEST:g}")
+    if loads.size > MAX_STEPS:
+        raise InputError(key, f"{loads.size} numbers", f"up to {MAX_STEPS} are allowed")
+    return loads
+
+
+class LoadRun(Run[Branch]):
+    """A run from load to load under way.
+
+    Attributes
+    ----------
+    jumps : list of Jump
+        Where it snapped to another state.
+    path : LoadPath
+        Where the membrane stands.
+    """
+
+    def __init__(self, scene: Scene, request: LoadRequest, on_step: OnStep | None = None) -> None:
+        clock, potential = time.perf_counter(), potential_of(scene)
+        if request.held is CONTROLS["center_height"]:
+            check_height("center_height", potential)
+        super().__init__(scene, potential, ("setup", "solve", "verdicts"))
+        self.timings["setup"] = time.perf_counter() - clock
+        self.request, self.on_step = request, on_step
+        self.jumps: list[Jump] = []
+        self.path = LoadPath(potential, request.held, request.solver)
+
+    def set_out(self, start: Equilibrium) -> None:
+        """Stand at a start, which is solved again: it may be of another scene, or of another mesh."""
+        state = resume(self.potential, start)
+        self.path.set_out(state, self._load_of(start, state))
+
+    def go_on(self, unfinished: Branch) -> None:
+        """Stand where a run through these loads was interrupted."""
+        memory, count = unfinished.memory, len(unfinished)
+        if type(memory) is not PathMemory or not 0 < count <= len(self.request.loads):
+            raise InputError("unfinished", unfinished, "a branch that on_checkpoint was called with is allowed")
+        self.found, self.jumps = list(unfinished), list(unfinished.jumps)
+        self.timings |= unfinished.timings
+        self.path.go_on(restore(self.potential, unfinished[-1]), float(self.request.loads[count - 1]), predictor_of(memory))
+
+    def step(self) -> End | None:
+        index, loads = len(self.found), self.request.loads
+        if index == len(loads):
+            return (Status.CONVERGED, "") if self.shortfall is None else (Status.ACCURACY_NOT_MET, str(self.shortfall))
+        clock = time.perf_counter()
+        try:
+            with self.timed("solve"):
+                state, turn = self.path.to(float(loads[index]), self.request.at_limit == "jump")
+        except SolveError as error:
+            return error.status, self._not_reached(index, str(error))
+        with self.timed("verdicts"):
+            gas = self.request.held.at(self.path.load) if isinstance(self.request.held, Gas) else None
+            new = record(self.scene, self.potential, state, self.found[-1] if self.found else None, clock, gas)
+        if turn is not None:
+            self.jumps.append(Jump(index, self._limit(turn), new))
+        self.found.append(new)
+        if self.on_step is not None:
+            self.on_step(index, len(loads), new)
+        return self._slack(state) if new.status is Status.SLACK else None
+
+    def _slack(self, state: State) -> End | None:
+        """The end at a slack membrane, which is no start for another load; a last one may be what was asked for."""
+        index, message = len(self.found), str(slackness(self.potential, state))
+        if index < len(self.request.loads):
+            return Status.SLACK, self._not_reached(index, message)
+        return None if self.request.throw else (Status.SLACK, message)
+
+    def _not_reached(self, index: int, why: str) -> str:
+        return f"{self.request.held.words} {self.request.loads[index]:.9g} was not reached: {why}"
+
+    def _limit(self, turn: Turn) -> SpecialPoint | None:
+        if turn.fold is None:
+            return None
+        return special_point(self.scene.replace(analysis=type(self.scene.analysis)()), self.potential, turn.fold)
+
+    def _load_of(self, start: Equilibrium, state: State) -> float:
+        """The load of a start as it was given; that of the state it was corrected to where the two differ, as in another scene."""
+        held = self.request.held
+        found = float(state.value_of(held))
+        if not isinstance(held, ControlKind):
+            return found
+        given = float(getattr(start, held.name))
+        return given if abs(found - given) <= 1e-9 * max(abs(given), self.potential.space.units[held.name]) else found
+
+    def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
+        memory = None if found is None else remembered(self.path.memory, self.potential.space.n_free)
+        known = tuple(self.found) if found is None else found
+        return Branch(self.scene, known, status, message, dict(self.timings), None, memory, tuple(self.jumps), self.path.solver)

@@ -1,0 +1,362 @@
+"""A trace by arc length: what is asked, and how it is stepped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self, TypeAlias
+
+from ..checks import choice, is_number, number, sign
+from ..errors import InputError, SolveError, Status
+from ..potential import Array, Potential, potential_of
+from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
+from ..scene import QUANTITIES, Scene
+from ..solve import state_resolution, wellposed
+from ..solve.branch import FOLDS, BranchProblem, first_point, oriented_point
+from ..solve.contact import stopped_by_source, touches_source
+from ..solve.continuation import BranchPoint, StepControl, Tracer, trace_points
+from ..solve.controls import CONTROLS
+from ..solve.segment import Located, Segment
+from ..solve.special_points import branch_points, branches_crossing
+from ..solve.start import moderate, start_at_volume
+from ..solve.state import Predictor, State, at_rest
+from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
+from ..stability.azimuthal import azimuthal_eigenvalue
+from .arguments import check_height, check_ill_posed, check_max_steps
+from .meshing import carried
+from .running import End, Request, Run
+from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
+
+Start: TypeAlias = float | Equilibrium | SpecialPoint | Branch | None
+
+
+@dataclass(frozen=True, eq=False)
+class TraceRequest(Request):
+    """A branch, or a part of it, followed by arc length.
+
+    Attributes
+    ----------
+    start : float, Equilibrium, SpecialPoint, Branch or None
+        Where it sets out: a volume, a state, a branch point whose other branch is meant, or a trace that is continued.
+    targets : mapping of str to float
+        Values at which it ends, whichever is met first.
+    direction : {1, -1}
+    max_steps : int
+        Most steps.
+    steps : StepControl
+        Lengths and accuracy of the steps.
+    special_points : bool
+        Whether special points are located.
+    ill_posed : {"stop", "mark"}
+        What to do where the membrane is compressed or slack.
+    """
+
+    start: Start = None
+    targets: Mapping[str, float] = field(default_factory=dict)
+    direction: int = 1
+    max_steps: int = 400
+    steps: StepControl = field(default_factory=StepControl)
+    special_points: bool = True
+    ill_posed: str = "stop"
+
+    @classmethod
+    def checked(
+        cls,
+        start: Start,
+        until: Mapping[str, float] | None,
+        *,
+        direction: int,
+        max_steps: int,
+        steps: StepControl | None,
+        ill_posed: str,
+        special_points: bool = False,
+    ) -> Self:
+        """The request that the arguments of :func:`femmembrane.trace` make, or InputError."""
+        targets = checked_targets(until)
+        direction = sign("direction", direction, "1 (towards larger volume) or -1 is allowed")
+        check_ill_posed(ill_posed)
+        check_max_steps(max_steps)
+        return cls(start, targets, direction, int(max_steps), steps or StepControl(), special_points, ill_posed)
+
+    @property
+    def errors_at(self) -> str:
+        return "arc-length"
+
+    @property
+    def start_scene(self) -> Scene | None:
+        if isinstance(self.start, SpecialPoint):
+            return self.start.equilibrium.scene
+        return self.start.scene if isinstance(self.start, Branch) else None
+
+    def on(self, scene: Scene) -> Self:
+        return replace(self, start=carried(self.start, scene))
+
+    def trial(self) -> Self:
+        if isinstance(self.start, SpecialPoint):
+            raise InputError("start", self.start.kind, "a special point of a branch of this scene, on the mesh chosen for it, is allowed")
+        return replace(self, special_points=False)
+
+    def up_to(self, count: int) -> Self:
+        return replace(self, max_steps=count - 1, targets={})
+
+    def begin(self, scene: Scene, on_step: OnStep | None = None) -> TraceRun:
+        clock, run = time.perf_counter(), TraceRun(scene, self, on_step)
+        if isinstance(self.start, Branch):
+            run.go_on(self.start)
+            return run
+        if isinstance(self.start, SpecialPoint) and self.start.kind == "branch_point":
+            point = run.switched(self.start)
+        else:
+            state = _first_state(run.potential, self.start)
+            state_resolution.refuse_unresolved(run.potential, state)
+            point = first_point(run.potential, state, self.direction)
+        run.timings["setup"] = time.perf_counter() - clock
+        run.set_out(point, clock)
+        return run
+
+    def go_on(self, scene: Scene, unfinished: Branch, on_step: OnStep | None = None) -> TraceRun:
+        run = TraceRun(scene, replace(self, start=unfinished, direction=1), on_step)
+        run.go_on(unfinished)
+        run.made = run.regular - 1
+        run.timings |= unfinished.timings
+        return run
+
+
+def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
+    """The values at which a branch ends, by the names of their quantities, or InputError."""
+    if until is not None and not isinstance(until, Mapping):
+        raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
+    targets = dict(until or {})
+    for quantity, value in targets.items():
+        choice("until", quantity, QUANTITIES)
+        targets[quantity] = number(f"until.{quantity}", value)
+    return targets
+
+
+def _of_this_branch(point: SpecialPoint) -> Equilibrium:
+    if point.kind == "azimuthal_onset":
+        message = (
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
+            "folds and equilibria are allowed"
+        )
+        raise InputError("start", "azimuthal_onset", message)
+    return point.equilibrium
+
+
+def _first_state(potential: Potential, start: Start) -> State:
+    """The state at a volume, or of an equilibrium, from which a trace sets out."""
+    if isinstance(start, SpecialPoint):
+        start = _of_this_branch(start)
+    if isinstance(start, Equilibrium):
+        return resume(potential, start)
+    if start is None:
+        return start_at_volume(potential, potential.space.reference_volume + moderate(potential))
+    if not is_number(start):
+        raise InputError("start", start, "a volume, an Equilibrium, a SpecialPoint or a traced Branch is allowed")
+    volume = number("start", start, "a volume is allowed")
+    if at_rest(potential, CONTROLS["volume"], volume):
+        raise InputError(
+            "start", start, "the flat unloaded membrane has no stiffness to start from; a small volume is allowed, such as 1e-3"
+        )
+    return start_at_volume(potential, volume)
+
+
+class TraceRun(Run[Branch]):
+    """A trace under way.
+
+    Attributes
+    ----------
+    problem : BranchProblem
+        The equations of the branch.
+    tracer : Tracer
+        The length of the next step, and the memory that predicts it.
+    point : BranchPoint
+        The last regular step.
+    special : list of SpecialPoint or None
+        The special points so far; None when none are looked for.
+    regular : int
+        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
+    made : int
+        Number of steps that were made.
+    unexplained : list of str
+        Changes of inertia at which no special point was located.
+    """
+
+    point: BranchPoint
+
+    def __init__(self, scene: Scene, request: TraceRequest, on_step: OnStep | None = None) -> None:
+        super().__init__(scene, potential_of(scene), ("setup", "solve", "special_points", "verdicts"))
+        if "center_height" in request.targets:
+            check_height("until.center_height", self.potential)
+        self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
+        self.tracer = Tracer(Predictor(), request.steps.first, request.steps)
+        self.special: list[SpecialPoint] | None = [] if request.special_points else None
+        self.regular = self.made = 0
+        self.unexplained: list[str] = []
+        self._points: Iterator[BranchPoint] | None = None
+        self._crossing: Crossing | None = None
+
+    # --- where it sets out
+
+    def set_out(self, point: BranchPoint, clock: float) -> None:
+        """Stand at the first point of a branch, on which work began at a time."""
+        self.point, self.regular = point, 1
+        self._add(point, clock)
+
+    def switched(self, start: SpecialPoint) -> BranchPoint:
+        """The first point on half of the branch that crosses at a branch point."""
+        if start.tangent is None or start.tangent.shape != (self.potential.space.n_free + 1,):
+            raise InputError("start", "branch_point", "one of the special_points of a branch of this scene is allowed")
+        state = restore(self.potential, start.equilibrium)
+        known = oriented_point(self.potential, state, 0.0, start.tangent)
+        self._crossing = crossing_at(self.potential, known)
+        self._points = points_beyond(self.potential, self._crossing, self.request.direction, self.tracer)
+        return self._crossing.half(self.request.direction)
+
+    def go_on(self, start: Branch) -> None:
+        """Stand at the last regular step of a trace of this scene."""
+        if self.request.direction != 1 or potential_of(start.scene) is not self.potential:
+            raise InputError("start", "a Branch", "a branch of this scene is allowed, to be continued the way it was going (direction=1)")
+        memory = start.memory
+        if not isinstance(memory, TraceMemory):
+            raise InputError(
+                "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
+            )
+        self.tracer.path, self.tracer.step, self.tracer.known = predictor_of(memory), memory.step, memory.known
+        state = restore(self.potential, start[memory.regular - 1])
+        self.point = oriented_point(self.potential, state, memory.sigma[-1], memory.slopes[-1])
+        # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
+        self.found = [eq.in_scene(self.scene) for eq in start[: memory.regular]]
+        self.special = None
+        if start.special_points is not None:
+            self.special = [replace(p, equilibrium=p.equilibrium.in_scene(self.scene)) for p in start.special_points]
+        self.regular, self.unexplained = memory.regular, list(memory.unexplained)
+
+    # --- how it is stepped
+
+    def step(self) -> End | None:
+        if self.made == self.request.max_steps:
+            return self._all_made()
+        self.made += 1
+        try:
+            return self._step()
+        except SolveError as error:
+            near = self.potential.distance_to_sources(self.point.state.x)
+            return stopped_by_source(error, near, self.potential.space.unit) or (error.status, str(error))
+
+    def _all_made(self) -> End:
+        if self.shortfall is not None:
+            return Status.ACCURACY_NOT_MET, str(self.shortfall)
+        message = f"{self.request.max_steps} steps were made without meeting {dict(self.request.targets) or 'an end'}"
+        return self._explained(Status.STEP_LIMIT, message)
+
+    def _explained(self, status: Status, message: str) -> End:
+        """An end, unless a special point that must have been passed was not located."""
+        return (Status.UNEXPLAINED_INERTIA, "; ".join(self.unexplained)) if self.unexplained else (status, message)
+
+    def _step(self) -> End | None:
+        clock = time.perf_counter()
+        if self._points is None:
+            if (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
+                return end
+            self._points = trace_points(self.problem, self.point, self.tracer)
+        with self.timed("solve"):
+            new = next(self._points)
+        segment = Segment(self.problem, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
+        met = [point for q, v in self.request.targets.items() for point in segment.crossings(q, v)]
+        last = min(met, key=lambda p: p.sigma, default=None)
+        if unresolved := state_resolution.unresolved(self.potential, (last or new).state):
+            return Status.NOT_RESOLVED, f"at {self._place(last or new)} {unresolved}"
+        closing = self._look_for_special_points(segment, last)
+        last = closing or last
+        self._add(last or new, clock)
+        self._look_for_onsets(segment, last or new)
+        if closing is not None:
+            return Status.CLOSED, f"the branch came back to the branch point V = {closing.state.volume:.6g} at which it set out"
+        if last is not None and not wellposed.unresolved_source(self.potential, last.state.x):
+            return self._explained(Status.CONVERGED, "")
+        self.point, self.regular = new, len(self.found)
+        return self._ill_posed(new) or self._at_source(new)
+
+    def _ill_posed(self, point: BranchPoint) -> End | None:
+        bad = wellposed.ill_posed(self.potential, point.state.evaluation) if self.request.ill_posed == "stop" else None
+        if bad is None:
+            return None
+        return bad.status, f"at {self._place(point)} {bad}, and what a mesh finds beyond depends on the mesh"
+
+    def _at_source(self, point: BranchPoint) -> End | None:
+        state = point.state
+        if unresolved := wellposed.unresolved_source(self.potential, state.x):
+            return Status.DIPOLE_CONTACT, f"{unresolved} (V = {state.volume:.6g})"
+        if touching := touches_source(self.potential.distance_to_sources(state.x), self.potential.space.unit):
+            return Status.DIPOLE_CONTACT, f"{touching} at V = {state.volume:.6g}"
+        return None
+
+    def _place(self, point: BranchPoint) -> str:
+        height = self.potential.space.center_height(point.state.x)
+        return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+
+    def _add(self, point: BranchPoint, clock: float) -> None:
+        with self.timed("verdicts"):
+            new = record(self.scene, self.potential, point.state, self.found[-1] if self.found else None, clock)
+        self.found.append(new)
+        if self.on_step is not None:
+            self.on_step(len(self.found) - 1, self.request.max_steps + 1, new)
+
+    # --- what it looks for on the way
+
+    def _look_for_special_points(self, segment: Segment[BranchPoint], last: BranchPoint | None) -> BranchPoint | None:
+        """Keep the special points before the end of the trace; the branch point at which it set out, if it comes back to that."""
+        if self.special is None:
+            return None
+        with self.timed("special_points"):
+            located = [fold for kind in FOLDS for fold in segment.folds(kind)]
+            crossed = self._crossed(segment)
+            for fold in sorted(located + crossed, key=lambda f: f.point.sigma):
+                if last is None or fold.point.sigma <= last.sigma:
+                    self.special.append(self._special(fold))
+            return next((found.point for found in crossed if self._back(found.point, last)), None)
+
+    def _crossed(self, segment: Segment[BranchPoint]) -> list[Located[BranchPoint]]:
+        """The branch points on a segment; that one is missing is noted."""
+        number = branches_crossing(segment)
+        crossed = branch_points(segment) if number else []
+        if len(crossed) < number:
+            a, b = segment.a.state, segment.b.state
+            self.unexplained.append(f"the inertia changes between V = {a.volume:.6g} and {b.volume:.6g} without a located point")
+        return crossed
+
+    def _back(self, point: BranchPoint, last: BranchPoint | None) -> bool:
+        """Whether a branch point before the end of the trace is the one at which it set out."""
+        if len(self.found) < 3 or (last is not None and last.sigma < point.sigma):
+            return False
+        return same_crossing(self.potential, self.found[0].state, point.state.x)
+
+    def _look_for_onsets(self, segment: Segment[BranchPoint], end: BranchPoint) -> None:
+        """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
+        if self.special is None:
+            return
+        before, after = self.found[-2:]
+        top = (end.sigma - segment.a.sigma) / segment.length
+        for n in self.scene.analysis.azimuthal_modes:
+            verdict = before.verdict(azimuthal=n)
+            if verdict.smallest_eigenvalue * after.verdict(azimuthal=n).smallest_eigenvalue < 0:  # False where either is NaN (short-wave)
+
+                def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
+                    return azimuthal_eigenvalue(self.potential, point.state.x, point.state.pressure, n, guess).value
+
+                with self.timed("special_points"):
+                    self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))
+
+    def _special(self, fold: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
+        return special_point(self.scene, self.potential, fold, azimuthal)
+
+    def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
+        path = remembered(self.tracer.path, self.potential.space.n_free)
+        memory = TraceMemory(
+            path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained), self.tracer.known
+        )
+        special = None if self.special is None else tuple(self.special)
+        known = tuple(self.found) if found is None else found
+        return Branch(self.scene, known, status, message, dict(self.timings), special, memory, solver="newton")

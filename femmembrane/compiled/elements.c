@@ -10,6 +10,8 @@
 #include <string.h>
 
 #define LANES 4
+/* rows or columns of a product that are summed at once: each sum is a chain of additions, and a processor has room for several */
+#define TOGETHER 4
 /* points evaluated in one go: a block and the registers of the tape stay in the processor's cache */
 #define POINTS 256
 /* rows of the point function: energies and volume, two gradients, second derivatives, stresses */
@@ -23,6 +25,7 @@ typedef struct {
     int n_data;
     double *data;         /* point data, block after block, (n_data, n_quadrature, elements of the block) */
     int32_t *gather;      /* (n_elements, 2 n_local); n_free is what is held at zero */
+    int32_t *place;       /* where the entries of LANES elements go in the lower band, in the order of assembly */
     uint8_t *field;       /* (n_free) 0 for u, 1 for w */
     double *table;        /* (2 n_quadrature, n_local) values, then slopes */
     double *transposed;   /* (n_local, 2 n_quadrature) */
@@ -39,37 +42,78 @@ static double *doubles(size_t count)
 
 /* ---- evaluation ---------------------------------------------------------------------------------------------------------------- */
 
-/* out[r][e] = sum_k m[r][k] x[k][e]; x is readable up to the next multiple of LANES */
-static void product(const double *m, int rows, int depth, const double *x, Py_ssize_t ldx, double *out, Py_ssize_t lanes)
+/* LANES numbers in one register or two: compilers left alone with the loop take the wrong one of those around it to vectors */
+#if defined(__GNUC__)
+typedef double Lanes __attribute__((vector_size(8 * LANES)));
+#else
+typedef struct {
+    double v[LANES];
+} Lanes;
+#endif
+
+static inline void add_product(Lanes *sum, double a, const double *x)
 {
+#if defined(__GNUC__)
+    Lanes v;
+    memcpy(&v, x, sizeof v);
+    *sum += a * v;
+#else
+    for (int l = 0; l < LANES; l++)
+        sum->v[l] += a * x[l];
+#endif
+}
+
+/* sum[r][l] = sum_k m[r][k] x[k][l] for four rows; those beyond the last one are readable, and nobody reads their sums */
+static inline void rows_times(const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    Lanes s[TOGETHER];
+    memset(s, 0, sizeof s);
+    for (int k = 0; k < depth; k++, x += next)
+        for (int r = 0; r < TOGETHER; r++)
+            add_product(&s[r], m[r * depth + k], x);
+    memcpy(sum, s, sizeof s);
+}
+
+/* sum[c][l] = sum_k m[k] x[k][c][l] for four columns, likewise */
+static inline void row_times(const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    Lanes s[TOGETHER];
+    memset(s, 0, sizeof s);
+    for (int k = 0; k < depth; k++, x += next)
+        for (int c = 0; c < TOGETHER; c++)
+            add_product(&s[c], m[k], x + c * LANES);
+    memcpy(sum, s, sizeof s);
+}
+
+/* out[r][e] = sum_k m[r][k] x[k][e]; x is readable up to the next multiple of LANES */
+static inline void product(const double *m, int rows, int depth, const double *x, Py_ssize_t ldx, double *out, Py_ssize_t lanes)
+{
+    double sum[TOGETHER][LANES];
     for (Py_ssize_t g = 0; g < lanes; g += LANES) {
         const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
-        for (int r = 0; r < rows; r++) {
-            double sum[LANES] = {0};
-            for (int k = 0; k < depth; k++)
-                for (int l = 0; l < LANES; l++)
-                    sum[l] += m[r * depth + k] * x[k * ldx + g + l];
-            memcpy(out + r * lanes + g, sum, sizeof(double) * valid);
+        for (int first = 0; first < rows; first += TOGETHER) {
+            rows_times(m + first * depth, depth, x + g, ldx, sum);
+            for (int r = first; r < first + TOGETHER && r < rows; r++)
+                memcpy(out + r * lanes + g, sum[r - first], sizeof(double) * valid);
         }
     }
 }
 
 /* target[unknown] += sum_k transposed[i][k] density[k][e] for both components of the elements from `first` on */
-static void integrate(const Elements *s, const double *transposed, const double *density, Py_ssize_t first, Py_ssize_t lanes, double *target)
+static inline void integrate(const Elements *s, const double *transposed, const double *density, Py_ssize_t first, Py_ssize_t lanes, double *target)
 {
     const int nl = s->n_local, depth = 2 * s->n_quadrature;
+    double sum[TOGETHER][LANES];
     for (Py_ssize_t g = 0; g < lanes; g += LANES) {
         const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
         const int32_t *gather = s->gather + (first + g) * 2 * nl;
-        for (int i = 0; i < 2 * nl; i++) {
-            const double *row = transposed + (i % nl) * depth, *d = density + (i < nl ? 0 : depth * lanes) + g;
-            double sum[LANES] = {0};
-            for (int k = 0; k < depth; k++)
-                for (int l = 0; l < LANES; l++)
-                    sum[l] += row[k] * d[k * lanes + l];
-            for (int l = 0; l < valid; l++)
-                target[gather[l * 2 * nl + i]] += sum[l];
-        }
+        for (int component = 0; component < 2; component++)
+            for (int i = 0; i < nl; i += TOGETHER) {
+                rows_times(transposed + i * depth, depth, density + component * depth * lanes + g, lanes, sum);
+                for (int r = i; r < i + TOGETHER && r < nl; r++)
+                    for (int l = 0; l < valid; l++)
+                        target[gather[l * 2 * nl + component * nl + r]] += sum[r - i][l];
+            }
     }
 }
 
@@ -85,7 +129,7 @@ static double total(const double *x, Py_ssize_t n)
     return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
-static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py_ssize_t lanes)
+EACH_PROCESSOR static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py_ssize_t lanes)
 {
     const int nl = s->n_local, nq = s->n_quadrature;
     for (Py_ssize_t e = 0; e < lanes; e++) {
@@ -98,7 +142,7 @@ static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py
 }
 
 /* values (3), gradients (2, n_free) and densities (20, n_points) at the unknowns x; parameters of the point function in place */
-static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *gradients, double *density)
+EACH_PROCESSOR static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *gradients, double *density)
 {
     const int nq = s->n_quadrature;
     const Tape *tape = &s->tape;
@@ -134,7 +178,7 @@ static void evaluate(const Elements *s, const double *x, const double *parameter
 }
 
 /* largest sum of absolute forces |E'| + |P| |V'| that meet at an unknown of each component */
-static void force_scale(const Elements *s, const double *force, double pressure, double scale[2])
+EACH_PROCESSOR static void force_scale(const Elements *s, const double *force, double pressure, double scale[2])
 {
     const int nq = s->n_quadrature, rows = 4 * nq;
     const Py_ssize_t step = s->block, ne = s->n_elements;
@@ -160,15 +204,16 @@ static void force_scale(const Elements *s, const double *force, double pressure,
 /* where a pair of local variables (u, u_x, w, w_x) stands among the second derivatives */
 static const int PAIR[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
 
-/* Added to the lower triangle by columns, at (column step + row - column + above), and where `above` is not 0 to the upper one as well. */
-static void assemble(const Elements *s, const double *density, double *band, Py_ssize_t step, Py_ssize_t above)
+/* Added to the lower triangle by columns of depth kd + 1; one more entry behind them takes what belongs to no pair of unknowns. */
+EACH_PROCESSOR static void assemble(const Elements *s, const double *density, double *lower)
 {
     const int nl = s->n_local, nq = s->n_quadrature, depth = 2 * nq;
-    const Py_ssize_t ne = s->n_elements, n = s->n_free;
+    const Py_ssize_t ne = s->n_elements;
+    const int32_t *place = s->place;
     double *d = s->scratch, *t = d + N_STIFF * nq * LANES; /* t: (2 n_quadrature, 2 n_local, lanes) */
+    memset(lower, 0, sizeof(double) * ((s->kd + 1) * s->n_free + 1));
     for (Py_ssize_t first = 0; first < ne; first += LANES) {
         const int valid = ne - first < LANES ? (int)(ne - first) : LANES;
-        const int32_t *gather = s->gather + first * 2 * nl;
         for (int r = 0; r < N_STIFF * nq; r++)
             for (int l = 0; l < valid; l++)
                 d[r * LANES + l] = density[r * ne + first + l];
@@ -186,21 +231,12 @@ static void assemble(const Elements *s, const double *density, double *band, Py_
                     }
                 }
             for (int i = from; i < from + nl; i++)
-                for (int j = i; j < 2 * nl; j++) {
-                    double sum[LANES] = {0};
-                    const double *row = s->transposed + (i - from) * depth, *column = t + j * LANES;
-                    for (int k = 0; k < depth; k++)
+                for (int j = i; j < 2 * nl; j += TOGETHER) { /* beyond the last column lies the next row, and nobody reads its sums */
+                    double sum[TOGETHER][LANES];
+                    row_times(s->transposed + (i - from) * depth, depth, t + j * LANES, 2 * nl * LANES, sum);
+                    for (int c = j; c < j + TOGETHER && c < 2 * nl; c++, place += LANES)
                         for (int l = 0; l < LANES; l++)
-                            sum[l] += row[k] * column[k * 2 * nl * LANES + l];
-                    for (int l = 0; l < valid; l++) {
-                        const Py_ssize_t a = gather[l * 2 * nl + i], b = gather[l * 2 * nl + j];
-                        if (a < n && b < n) {
-                            const Py_ssize_t low = a < b ? a : b, high = a < b ? b : a;
-                            band[low * step + above + high - low] += sum[l];
-                            if (above && a != b)
-                                band[high * step + above + low - high] += sum[l];
-                        }
-                    }
+                            lower[place[l]] += sum[c - j][l];
                 }
         }
     }
@@ -226,14 +262,13 @@ static int bordered(const Elements *s, Border *b, const double *stiffness, const
     const Py_ssize_t n = s->n_free;
     free(f->lu), free(f->swaps);
     f->lu = NULL, f->swaps = NULL;
-    memset(f->lower, 0, sizeof(double) * (s->kd + 1) * n);
-    assemble(s, stiffness, f->lower, s->kd + 1, 0);
+    assemble(s, stiffness, f->lower);
     if (factor_symmetric(f) < 0) {
-        const int depth = 3 * s->kd + 1;
-        double *band = doubles((size_t)depth * n);
+        double *band = doubles((size_t)(3 * s->kd + 1) * n);
         if (band == NULL)
             return -1;
-        assemble(s, stiffness, band, depth, 2 * s->kd);
+        assemble(s, stiffness, f->lower);
+        general_storage(f->lower, (int)n, s->kd, band);
         const int failed = factor_general(f, band);
         free(band);
         if (failed)
@@ -252,10 +287,26 @@ static void elements_dealloc(PyObject *self)
     Elements *s = (Elements *)self;
     PyTypeObject *type = Py_TYPE(self);
     tape_free(&s->tape);
-    free(s->data), free(s->gather), free(s->field), free(s->table), free(s->scalars), free(s->registers), free(s->scratch);
+    free(s->data), free(s->gather), free(s->place), free(s->field), free(s->table), free(s->scalars), free(s->registers), free(s->scratch);
     free(s->sums), free(s->pointers), free(s->local), free(s->coefficients);
     PyObject_Free(self);
     Py_DECREF(type);
+}
+
+static void fill_places(Elements *s)
+{
+    const int nl = s->n_local;
+    const Py_ssize_t n = s->n_free, nobody = n * (s->kd + 1);
+    int32_t *place = s->place;
+    for (Py_ssize_t first = 0; first < s->n_elements; first += LANES)
+        for (int i = 0; i < 2 * nl; i++)
+            for (int j = i; j < 2 * nl; j++)
+                for (Py_ssize_t e = first; e < first + LANES; e++) {
+                    const int32_t *gather = s->gather + e * 2 * nl;
+                    const Py_ssize_t a = e < s->n_elements ? gather[i] : n, b = e < s->n_elements ? gather[j] : n;
+                    const Py_ssize_t low = a < b ? a : b, high = a < b ? b : a;
+                    *place++ = (int32_t)(high < n ? low * (s->kd + 1) + high - low : nobody);
+                }
 }
 
 static int elements_fill(Elements *s, const double *data, const int64_t *gather, const double *table, const int64_t *field)
@@ -264,13 +315,14 @@ static int elements_fill(Elements *s, const double *data, const int64_t *gather,
     const Py_ssize_t ne = s->n_elements, cells = (Py_ssize_t)2 * nq * nl;
     const Py_ssize_t most = POINTS / nq < LANES ? LANES : POINTS / nq / LANES * LANES;
     s->block = ne < most ? ne : most;
-    const size_t points = (size_t)s->block * nq;
-    s->data = doubles(s->n_data * s->n_points), s->table = doubles(3 * cells), s->local = doubles(4 * points);
+    const size_t points = (size_t)s->block * nq, spare = TOGETHER * 2 * (nq + nl); /* what TOGETHER reads beyond the last row */
+    s->data = doubles(s->n_data * s->n_points), s->table = doubles(3 * cells + spare), s->local = doubles(4 * points);
     s->gather = malloc(sizeof(int32_t) * (ne * 2 * nl + 1)), s->field = malloc(s->n_free + 1);
+    s->place = malloc(sizeof(int32_t) * ((ne + LANES) * nl * (2 * nl + 1)));
     s->scalars = doubles(s->tape.n_scalars + 2), s->registers = doubles((s->tape.n_registers - s->n_data - 4) * points);
-    s->scratch = doubles((size_t)(N_STIFF * nq + 2 * nq * 2 * nl) * LANES), s->sums = doubles(2 * (s->n_free + 1));
+    s->scratch = doubles((size_t)(N_STIFF * nq + 2 * nq * 2 * nl + TOGETHER) * LANES), s->sums = doubles(2 * (s->n_free + 1));
     s->pointers = calloc(s->tape.n_registers + 1, sizeof(double *)), s->coefficients = doubles(2 * nl * s->block);
-    if (!(s->data && s->table && s->local && s->gather && s->field && s->scalars && s->registers && s->scratch && s->sums && s->pointers &&
+    if (!(s->data && s->table && s->local && s->gather && s->place && s->field && s->scalars && s->registers && s->scratch && s->sums && s->pointers &&
           s->coefficients)) {
         PyErr_NoMemory();
         return -1;
@@ -300,6 +352,7 @@ static int elements_fill(Elements *s, const double *data, const int64_t *gather,
                     return -1;
                 }
             }
+    fill_places(s);
     for (Py_ssize_t i = 0; i < s->n_free; i++)
         s->field[i] = field[i] != 0;
     for (Py_ssize_t first = 0; first < ne; first += s->block) {
@@ -403,13 +456,19 @@ static PyObject *elements_assemble(PyObject *self, PyObject *args)
     Py_buffer d = {0}, b = {0};
     if (!PyArg_ParseTuple(args, "OO", &density, &band))
         return NULL;
+    double *lower = NULL;
     const int bad = take_array(density, &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
                     take_array(band, &b, 'd', s->n_free * (3 * s->kd + 1), 1, "band") < 0;
-    if (!bad)
-        assemble(s, d.buf, b.buf, 3 * s->kd + 1, 2 * s->kd);
+    if (!bad && (lower = doubles((size_t)(s->kd + 1) * s->n_free + 1)) != NULL) {
+        assemble(s, d.buf, lower);
+        general_storage(lower, (int)s->n_free, s->kd, b.buf);
+    }
     PyBuffer_Release(&d), PyBuffer_Release(&b);
     if (bad)
         return NULL;
+    if (lower == NULL)
+        return PyErr_NoMemory();
+    free(lower);
     Py_RETURN_NONE;
 }
 

@@ -242,7 +242,7 @@ def test_every_operation_is_casadis():
         densities = np.empty((20, n))
         for first, second in ((0.3, -1.2), (800.0, 0.0)):
             parameters = np.array([first, second])
-            elements.evaluate(right.copy(), first, second, np.empty((2, n)), densities)
+            elements.evaluate(right.copy(), first, second, np.empty((3, n)), densities)
             exact = np.array(vectorise(function, n)(left[:, None], np.stack([right, *3 * [np.zeros(n)]]).T, parameters)).T
             np.testing.assert_allclose(densities, exact[3:], rtol=6e-16, atol=5e-324)
     assert space.n_elements == n
@@ -281,7 +281,7 @@ def test_wrong_arrays_are_refused():
     """Sizes and types are checked at the door: nothing is read or written out of bounds."""
     module, potential = NATIVE, potential_of(SHAPES["degree 6"])
     n = potential.space.n_free
-    elements, gradients, densities = potential.elements.native, np.empty((2, n)), np.empty((20, potential.n_points))
+    elements, gradients, densities = potential.elements.native, np.empty((3, n)), np.empty((20, potential.n_points))
     for x, room in ((np.zeros(n - 1), gradients), (np.zeros(n), gradients[:1]), (np.zeros(2 * n)[::2], gradients)):
         with pytest.raises((ValueError, BufferError)):
             elements.evaluate(x, 0.0, 1.0, room, densities)

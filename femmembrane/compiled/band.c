@@ -239,13 +239,15 @@ double border_solve(const Border *b, const double *f, double g, double *x)
 }
 
 /* x . A y */
+EACH_PROCESSOR
 static double inner(const double *lower, Py_ssize_t step, int n, int kd, const double *x, const double *y)
 {
     double sum = 0.0;
     for (int j = 0; j < n; j++) {
         const double *column = lower + (size_t)j * step;
         const int m = n - 1 - j < kd ? n - 1 - j : kd;
-        sum += x[j] * (column[0] * y[j] + dot(column + 1, y + j + 1, m)) + y[j] * dot(column + 1, x + j + 1, m);
+        const double of_y = dot(column + 1, y + j + 1, m), of_x = x == y ? of_y : dot(column + 1, x + j + 1, m);
+        sum += x[j] * (column[0] * y[j] + of_y) + y[j] * of_x;
     }
     return sum;
 }

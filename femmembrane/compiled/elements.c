@@ -141,8 +141,8 @@ EACH_PROCESSOR static void interpolate(const Elements *s, const double *x, Py_ss
     product(s->table, 2 * nq, nl, s->coefficients + nl * s->block, s->block, s->local + 2 * nq * lanes, lanes);
 }
 
-/* values (3), gradients (2, n_free) and densities (20, n_points) at the unknowns x; parameters of the point function in place */
-EACH_PROCESSOR static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *gradients, double *density)
+/* values (3), forces (3, n_free: E', V', P V' - E') and densities (20, n_points) at the unknowns x; parameters of the point function in place */
+EACH_PROCESSOR static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *forces, double *density)
 {
     const int nq = s->n_quadrature;
     const Tape *tape = &s->tape;
@@ -173,8 +173,10 @@ EACH_PROCESSOR static void evaluate(const Elements *s, const double *x, const do
                 memcpy(density + r * s->n_elements + first, force + r * lanes, sizeof(double) * lanes);
         }
     }
-    memcpy(gradients, s->sums, sizeof(double) * n);
-    memcpy(gradients + n, s->sums + spare, sizeof(double) * n);
+    for (Py_ssize_t i = 0; i < n; i++) {
+        const double elastic = forces[i] = s->sums[i], volume = forces[n + i] = s->sums[spare + i];
+        forces[2 * n + i] = parameters[0] * volume - elastic;
+    }
 }
 
 /* largest sum of absolute forces |E'| + |P| |V'| that meet at an unknown of each component */
@@ -409,7 +411,7 @@ static int all_finite(const double *x, Py_ssize_t n)
     return sum == 0.0;
 }
 
-/* evaluate(x, pressure, factor, gradients, densities): (elastic, magnetic, volume, whether gradients and second derivatives are numbers) */
+/* evaluate(x, pressure, factor, forces, densities): (elastic, magnetic, volume, whether gradients and second derivatives are numbers) */
 static PyObject *elements_evaluate(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
@@ -418,7 +420,7 @@ static PyObject *elements_evaluate(PyObject *self, PyObject *args)
     double values[3], parameters[2];
     if (!PyArg_ParseTuple(args, "OddOO", &o[0], &parameters[0], &parameters[1], &o[1], &o[2]))
         return NULL;
-    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &g, 'd', 2 * s->n_free, 1, "gradients") < 0 ||
+    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &g, 'd', 3 * s->n_free, 1, "forces") < 0 ||
                     take_array(o[2], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
     if (!bad) {
         const double *stiffness = (double *)d.buf + N_FORCE * s->n_points;
@@ -448,7 +450,7 @@ static PyObject *elements_at_quadrature(PyObject *self, PyObject *args)
     return bad ? NULL : Py_NewRef(Py_None);
 }
 
-/* assemble(stiffness, band): the second derivatives into general band storage, shape (n_free, 3 kd + 1) of zeros */
+/* assemble(densities, band): the second derivatives of an evaluation into general band storage, shape (n_free, 3 kd + 1) of zeros */
 static PyObject *elements_assemble(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
@@ -457,10 +459,10 @@ static PyObject *elements_assemble(PyObject *self, PyObject *args)
     if (!PyArg_ParseTuple(args, "OO", &density, &band))
         return NULL;
     double *lower = NULL;
-    const int bad = take_array(density, &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
+    const int bad = take_array(density, &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0 ||
                     take_array(band, &b, 'd', s->n_free * (3 * s->kd + 1), 1, "band") < 0;
     if (!bad && (lower = doubles((size_t)(s->kd + 1) * s->n_free + 1)) != NULL) {
-        assemble(s, d.buf, lower);
+        assemble(s, (double *)d.buf + N_FORCE * s->n_points, lower);
         general_storage(lower, (int)s->n_free, s->kd, b.buf);
     }
     PyBuffer_Release(&d), PyBuffer_Release(&b);
@@ -494,14 +496,14 @@ static PyObject *elements_force_scale(PyObject *self, PyObject *args)
     double pressure, scale[2];
     if (!PyArg_ParseTuple(args, "Od", &source, &pressure))
         return NULL;
-    const int bad = take_array(source, &d, 'd', N_FORCE * s->n_points, 0, "densities") < 0;
+    const int bad = take_array(source, &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0;
     if (!bad)
         force_scale(s, d.buf, pressure, scale);
     PyBuffer_Release(&d);
     return bad ? NULL : Py_BuildValue("(dd)", scale[0], scale[1]);
 }
 
-/* border(stiffness, volume gradient, row, corner): factors of [K, -V'; row, corner] */
+/* border(densities, volume gradient, row, corner): factors of [K, -V'; row, corner] */
 static PyObject *elements_border(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
@@ -512,14 +514,14 @@ static PyObject *elements_border(PyObject *self, PyObject *args)
     if (!PyArg_ParseTuple(args, "OOOd", &o[0], &o[1], &o[2], &corner))
         return NULL;
     BorderObject *border = NULL;
-    const int bad = take_array(o[0], &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
+    const int bad = take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0 ||
                     take_array(o[1], &v, 'd', n, 0, "volume gradient") < 0 || take_array(o[2], &r, 'd', n, 0, "row") < 0;
     if (!bad) {
         border = PyObject_New(BorderObject, types.border);
         int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0;
         if (!without) {
             memcpy(border->border.row, r.buf, sizeof(double) * n);
-            without = bordered(s, &border->border, d.buf, v.buf, corner) < 0;
+            without = bordered(s, &border->border, (double *)d.buf + N_FORCE * s->n_points, v.buf, corner) < 0;
         }
         if (without) {
             Py_CLEAR(border);

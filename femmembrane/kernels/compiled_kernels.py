@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .. import _native
 
 #: what the sources in ``compiled/`` answer; raised there and here when arguments or answers change
-INTERFACE = 3
+INTERFACE = 4
 
 
 class CompiledKernels:
@@ -95,17 +95,17 @@ class CompiledElements:
         return local
 
     def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
-        gradients, densities = np.empty((2, self._n_free)), np.empty((N_DENSITIES, self._n_points))
-        elastic, magnetic, volume, finite = self.native.evaluate(x, pressure, factor, gradients, densities)
-        return elastic, magnetic, volume, finite, gradients, densities
+        forces, densities = np.empty((3, self._n_free)), np.empty((N_DENSITIES, self._n_points))
+        elastic, magnetic, volume, finite = self.native.evaluate(x, pressure, factor, forces, densities)
+        return elastic, magnetic, volume, finite, forces, densities
 
-    def assemble(self, stiffness: Array) -> Array:
+    def assemble(self, densities: Array) -> Array:
         band = np.zeros((self._n_free, self._depth))
-        self.native.assemble(stiffness, band)
+        self.native.assemble(densities, band)
         return band.T
 
-    def border(self, stiffness: Array, volume_gradient: Array, row: Array, corner: float) -> CompiledBorder:
-        return CompiledBorder(self.native.border(stiffness, volume_gradient, row, corner))
+    def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> CompiledBorder:
+        return CompiledBorder(self.native.border(densities, volume_gradient, row, corner))
 
 
 class CompiledFactor:
@@ -131,5 +131,5 @@ class CompiledBorder:
         self._own = own
 
     def solve(self, f: Array, g: float) -> tuple[Array, float]:
-        x = np.empty_like(f)
+        x = np.empty(len(f))
         return x, self._own.solve(f, g, x)

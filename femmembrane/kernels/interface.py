@@ -57,27 +57,28 @@ class Elements(Protocol):
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
 
     def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
-        """Elastic and magnetic energy, volume, whether all derivatives are numbers, the gradients of E and V, and the densities.
+        """Elastic and magnetic energy, volume, whether all derivatives are numbers, the forces, and the densities.
 
         Returns
         -------
         elastic, magnetic, volume : float
         finite : bool
-        gradients : ndarray, shape (2, n_free)
+        forces : ndarray, shape (3, n_free)
+            E', V' and what is out of balance, P V' - E'.
         densities : ndarray, shape (N_DENSITIES, n_points)
         """
 
-    def assemble(self, stiffness: Array) -> Array:
-        """Band of the second derivatives in LAPACK general storage, shape (3 kd + 1, n_free), Fortran order."""
+    def assemble(self, densities: Array) -> Array:
+        """Band of the second derivatives among the densities of an evaluation, in LAPACK general storage, shape (3 kd + 1, n_free), Fortran order."""
 
-    def border(self, stiffness: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
-        """Factors of [K, -V'; row, corner] with K assembled of the second derivatives."""
+    def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
+        """Factors of [K, -V'; row, corner] with K assembled as by :meth:`assemble`."""
 
     def largest(self, x: Array) -> tuple[float, float]:
         """Largest sizes of a vector of unknowns among u and among w; infinite where there is no number."""
 
-    def force_scale(self, force_density: Array, pressure: float) -> tuple[float, float]:
-        """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
+    def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
+        """Sum of the absolute forces that meet at the nodes, largest for u and for w, from the densities of an evaluation."""
 
 
 @dataclass(frozen=True)

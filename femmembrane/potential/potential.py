@@ -35,7 +35,8 @@ class Evaluation:
     Attributes
     ----------
     elastic_energy, magnetic_energy, volume : float
-    gradient, volume_gradient : ndarray, shape (n_free,)
+    gradient, volume_gradient, unbalanced : ndarray, shape (n_free,)
+        E', V' and P V' - E' at the pressure of the evaluation.
     finite : bool
         Whether all derivatives are numbers: outside the domain of the energy they are not.
     elements : Elements
@@ -43,7 +44,7 @@ class Evaluation:
     """
 
     __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient"),
+        *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient", "unbalanced"),
         *("potential", "elements", "factor", "_densities", "_band", "_negative"),
     )
 
@@ -54,14 +55,14 @@ class Evaluation:
         magnetic_energy: float,
         volume: float,
         finite: bool,
-        gradients: Array,
+        forces: Array,
         densities: Array,
         potential: Potential,
         elements: Elements,
         factor: float,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.gradient, self.volume_gradient = gradients[0], gradients[1]
+        self.gradient, self.volume_gradient, self.unbalanced = forces
         self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
         self._band: Array | None = None
         self._negative: int | None = None
@@ -85,7 +86,7 @@ class Evaluation:
     def band(self) -> Array:
         """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
         if self._band is None:
-            self._band = self.elements.assemble(self._densities[N_FORCE : N_FORCE + N_STIFFNESS])
+            self._band = self.elements.assemble(self._densities)
         return self._band
 
     @property
@@ -97,7 +98,11 @@ class Evaluation:
 
     def border(self, row: Array, corner: float) -> Border:
         """Factors of :attr:`band` with the column -V' and the row of a control."""
-        return self.elements.border(self._densities[N_FORCE : N_FORCE + N_STIFFNESS], self.volume_gradient, row, corner)
+        return self.elements.border(self._densities, self.volume_gradient, row, corner)
+
+    def force_scale(self, pressure: float) -> tuple[float, float]:
+        """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
+        return self.elements.force_scale(self._densities, pressure)
 
     @property
     def load_energy(self) -> float:
@@ -129,6 +134,7 @@ class Potential:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
         self.sources = acting_sources(scene.sources, scene.susceptibility)  # nothing is built of others
+        self._circles = tuple(circle for source in self.sources for circle in source.circles)
         self.loads = tuple(load for load in scene.loads if load.acts)
         if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
             advice = (
@@ -245,14 +251,14 @@ class Potential:
         """Whether the membrane went through a source between two states: no branch does, but a step of a coarse mesh may jump across."""
         if not self.sources:
             return False
-        heights = zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True)
-        if any(source.passed(*pair) for pair in heights for source in self.sources):
-            return True
-        circles = [circle for source in self.sources for circle in source.circles]
-        if not circles:
+        for heights in zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True):
+            for source in self.sources:
+                if source.passed(*heights):
+                    return True
+        if not self._circles:
             return False
         meridians = [self._meridian(x) for x in (before, after)]
-        return any(swept(meridians[0], meridians[1], circle) for circle in circles)
+        return any(swept(meridians[0], meridians[1], circle) for circle in self._circles)
 
     def _meridian(self, x: Array) -> Array:
         """Positions (rho, eta) of the nodes, shape (2, n)."""
@@ -266,7 +272,7 @@ class Potential:
 
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
-        return self.elements.force_scale(evaluation.force_density, pressure)
+        return evaluation.force_scale(pressure)
 
     def response(self, e1: Array, e2: Array) -> Array:
         """Principal mechanical stresses and their derivatives with respect to the Hencky strains.

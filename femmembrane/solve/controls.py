@@ -116,7 +116,7 @@ class Gas:
         return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(slots=True, eq=False)
 class ArcLengthControl:
     """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0, the inner product already applied to the tangent (its dual)."""
 

@@ -130,7 +130,7 @@ class Equations:
         bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
+        self.unbalanced = evaluation.unbalanced
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = evaluation.finite and math.isfinite(pressure)
@@ -154,7 +154,7 @@ class Equations:
     def scales(self) -> tuple[float, float]:
         """The forces that meet at a node, largest along u and along w."""
         if self._scales is None:
-            self._scales = self.potential.force_scale(self.evaluation, self.pressure)
+            self._scales = self.evaluation.force_scale(self.pressure)
         return self._scales
 
     @property
@@ -210,7 +210,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     while length > 1e-4:
         x, pressure = equations.x + length * dx, equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
-        unbalanced = pressure * new.volume_gradient - new.gradient
+        unbalanced = new.unbalanced
         if max(potential.largest(unbalanced)) < np.inf:
             gap = equations.control.equation(potential.space, x, pressure, new)[0]
             left = potential.largest(equations.simplified_step(unbalanced, gap))
@@ -230,17 +230,17 @@ def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
     (du, dw), (u, w) = change, size
     if du == math.inf or dw == math.inf:
         return math.inf
-    a = du / max(u, du) if du else 0.0
-    b = dw / max(w, dw) if dw else 0.0
-    return max(a, b)
+    a = (du / u if du < u else 1.0) if du else 0.0
+    b = (dw / w if dw < w else 1.0) if dw else 0.0
+    return a if a > b else b
 
 
 def residuals_over(size: tuple[float, float], scales: tuple[float, float]) -> tuple[float, float]:
     """Out-of-balance forces along u and along w over the forces that meet at a node."""
     # where no force acts along one of them, what is there is round-off of the other
     least = _EPSILON * max(scales)
-    u, w = (r / max(s, least) if r else 0.0 for r, s in zip(size, scales, strict=True))
-    return u, w
+    (u, w), (scale_u, scale_w) = size, scales
+    return u / max(scale_u, least) if u else 0.0, w / max(scale_w, least) if w else 0.0
 
 
 def relative_residual(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> float:

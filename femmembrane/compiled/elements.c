@@ -503,33 +503,59 @@ static PyObject *elements_force_scale(PyObject *self, PyObject *args)
     return bad ? NULL : Py_BuildValue("(dd)", scale[0], scale[1]);
 }
 
+/* a new object with the factors of [K, -V'; row, corner], or NULL with an exception set */
+static BorderObject *new_border(const Elements *s, const double *densities, const double *volume_gradient, const double *row, double corner)
+{
+    BorderObject *border = PyObject_New(BorderObject, types.border);
+    int without = border == NULL || border_init(&border->border, (int)s->n_free, s->kd) < 0;
+    if (!without) {
+        memcpy(border->border.row, row, sizeof(double) * s->n_free);
+        without = bordered(s, &border->border, densities + N_FORCE * s->n_points, volume_gradient, corner) < 0;
+    }
+    if (without) {
+        Py_CLEAR(border);
+        PyErr_NoMemory();
+    }
+    return border;
+}
+
 /* border(densities, volume gradient, row, corner): factors of [K, -V'; row, corner] */
 static PyObject *elements_border(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
-    const Py_ssize_t n = s->n_free;
     PyObject *o[3];
     Py_buffer d = {0}, v = {0}, r = {0};
     double corner;
     if (!PyArg_ParseTuple(args, "OOOd", &o[0], &o[1], &o[2], &corner))
         return NULL;
     BorderObject *border = NULL;
-    const int bad = take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0 ||
-                    take_array(o[1], &v, 'd', n, 0, "volume gradient") < 0 || take_array(o[2], &r, 'd', n, 0, "row") < 0;
-    if (!bad) {
-        border = PyObject_New(BorderObject, types.border);
-        int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0;
-        if (!without) {
-            memcpy(border->border.row, r.buf, sizeof(double) * n);
-            without = bordered(s, &border->border, (double *)d.buf + N_FORCE * s->n_points, v.buf, corner) < 0;
-        }
-        if (without) {
-            Py_CLEAR(border);
-            PyErr_NoMemory();
-        }
-    }
+    if (take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") == 0 && take_array(o[1], &v, 'd', s->n_free, 0, "volume gradient") == 0 &&
+        take_array(o[2], &r, 'd', s->n_free, 0, "row") == 0)
+        border = new_border(s, d.buf, v.buf, r.buf, corner);
     PyBuffer_Release(&d), PyBuffer_Release(&v), PyBuffer_Release(&r);
     return (PyObject *)border;
+}
+
+/* step(densities, forces, row, corner, gap, x, dx): (Border, dp, largest of dx, largest of x) with the solution for (P V' - E', -gap) in dx */
+static PyObject *elements_step(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    const Py_ssize_t n = s->n_free;
+    PyObject *o[5];
+    Py_buffer d = {0}, f = {0}, r = {0}, x = {0}, dx = {0};
+    double corner, gap, dp = 0.0, change[2], size[2];
+    if (!PyArg_ParseTuple(args, "OOOddOO", &o[0], &o[1], &o[2], &corner, &gap, &o[3], &o[4]))
+        return NULL;
+    BorderObject *border = NULL;
+    if (take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") == 0 && take_array(o[1], &f, 'd', 3 * n, 0, "forces") == 0 &&
+        take_array(o[2], &r, 'd', n, 0, "row") == 0 && take_array(o[3], &x, 'd', n, 0, "x") == 0 && take_array(o[4], &dx, 'd', n, 1, "dx") == 0)
+        border = new_border(s, d.buf, (double *)f.buf + n, r.buf, corner);
+    if (border != NULL) {
+        dp = border_solve(&border->border, (double *)f.buf + 2 * n, -gap, dx.buf);
+        largest(s, dx.buf, change), largest(s, x.buf, size);
+    }
+    PyBuffer_Release(&d), PyBuffer_Release(&f), PyBuffer_Release(&r), PyBuffer_Release(&x), PyBuffer_Release(&dx);
+    return border == NULL ? NULL : Py_BuildValue("Nd(dd)(dd)", border, dp, change[0], change[1], size[0], size[1]);
 }
 
 static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadrature, METH_VARARGS, NULL},
@@ -538,6 +564,7 @@ static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadratur
                                          {"largest", elements_largest, METH_O, NULL},
                                          {"force_scale", elements_force_scale, METH_VARARGS, NULL},
                                          {"border", elements_border, METH_VARARGS, NULL},
+                                         {"step", elements_step, METH_VARARGS, NULL},
                                          {NULL, NULL, 0, NULL}};
 static PyType_Slot elements_slots[] = {
     {Py_tp_new, elements_new}, {Py_tp_dealloc, elements_dealloc}, {Py_tp_methods, elements_methods}, {0, NULL}};

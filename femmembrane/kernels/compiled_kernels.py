@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..discretization.space import Space
-from .interface import N_DENSITIES, Array, Elements, Pencil, PointFunction, Rayleigh, Tape
+from .interface import N_DENSITIES, Array, Elements, Pencil, PointFunction, Rayleigh, Step, Tape
 from .numpy_kernels import NumpyKernels
 
 if TYPE_CHECKING:
@@ -106,6 +106,11 @@ class CompiledElements:
 
     def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> CompiledBorder:
         return CompiledBorder(self.native.border(densities, volume_gradient, row, corner))
+
+    def step(self, densities: Array, forces: Array, row: Array, corner: float, gap: float, x: Array) -> Step:
+        dx = np.empty(self._n_free)
+        border, dp, change, size = self.native.step(densities, forces, row, corner, gap, x, dx)
+        return CompiledBorder(border), dx, dp, change, size
 
 
 class CompiledFactor:

@@ -47,6 +47,10 @@ class Border(Protocol):
     def solve(self, f: Array, g: float) -> tuple[Array, float]: ...
 
 
+#: factors, corrections of x and of P, sizes of the former and of x
+Step = tuple[Border, Array, float, tuple[float, float], tuple[float, float]]
+
+
 class Elements(Protocol):
     """The elements of one space with one point function; vectors are contiguous."""
 
@@ -73,6 +77,18 @@ class Elements(Protocol):
 
     def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
         """Factors of [K, -V'; row, corner] with K assembled as by :meth:`assemble`."""
+
+    def step(self, densities: Array, forces: Array, row: Array, corner: float, gap: float, x: Array) -> Step:
+        """What a bordered Newton step at x takes, in one call: :meth:`border`, its solution for (P V' - E', -gap), and sizes.
+
+        Returns
+        -------
+        border : Border
+        dx : ndarray, shape (n_free,)
+        dp : float
+        change, size : tuple of float
+            :meth:`largest` of dx and of x.
+        """
 
     def largest(self, x: Array) -> tuple[float, float]:
         """Largest sizes of a vector of unknowns among u and among w; infinite where there is no number."""

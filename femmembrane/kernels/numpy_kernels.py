@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from ..discretization.space import Space
 from .bordered import BorderedFactor
-from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Array, Border, Pencil, PointFunction, Rayleigh
+from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Array, Border, Pencil, PointFunction, Rayleigh, Step
 
 
 class NumpyKernels:
@@ -71,6 +71,11 @@ class NumpyElements:
 
     def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
         return BorderedFactor(NumpyFactor(self.assemble(densities)), -volume_gradient, row, corner)
+
+    def step(self, densities: Array, forces: Array, row: Array, corner: float, gap: float, x: Array) -> Step:
+        border = self.border(densities, forces[1], row, corner)
+        dx, dp = border.solve(forces[2], -gap)
+        return border, dx, dp, self.largest(dx), self.largest(x)
 
     def largest(self, x: Array) -> tuple[float, float]:
         u, w = (float(np.abs(x[index]).max(initial=0.0)) for index in self._space.fields)

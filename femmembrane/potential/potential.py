@@ -16,7 +16,7 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
 from ..physics.tension_field import strain_energy
@@ -45,7 +45,7 @@ class Evaluation:
 
     __slots__ = (
         *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient", "unbalanced"),
-        *("potential", "elements", "factor", "_densities", "_band", "_negative"),
+        *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative"),
     )
 
     def __init__(
@@ -62,7 +62,7 @@ class Evaluation:
         factor: float,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.gradient, self.volume_gradient, self.unbalanced = forces
+        self.gradient, self.volume_gradient, self.unbalanced = self._forces = forces
         self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
         self._band: Array | None = None
         self._negative: int | None = None
@@ -99,6 +99,10 @@ class Evaluation:
     def border(self, row: Array, corner: float) -> Border:
         """Factors of :attr:`band` with the column -V' and the row of a control."""
         return self.elements.border(self._densities, self.volume_gradient, row, corner)
+
+    def step(self, row: Array, corner: float, gap: float) -> Step:
+        """The bordered Newton step at x and its factors, see :meth:`.Elements.step`."""
+        return self.elements.step(self._densities, self._forces, row, corner, gap, self.x)
 
     def force_scale(self, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w."""

@@ -85,7 +85,7 @@ def correct(
         if not equations.finite:
             return NewtonResult(x, pressure, evaluation, None, iteration, np.inf, np.inf, equations.gap, Status.NOT_CONVERGED)
         dx, dp = equations.newton_step()
-        size = equations.size(dx)
+        size = equations.size()
         close, previously_close = size <= tolerance, previous <= tolerance
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
@@ -105,7 +105,7 @@ def correct(
         foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
-            if last.finite and (left := last.size(last.newton_step()[0])) <= tolerance / 10:
+            if last.finite and (left := last.correction()) <= tolerance / 10:
                 result = last.result(iteration, left, Status.CONVERGED)
                 if result.residual <= RESIDUAL:
                     return result
@@ -117,7 +117,7 @@ class Equations:
 
     __slots__ = (
         *("potential", "control", "x", "pressure", "evaluation", "bordered"),
-        *("unbalanced", "gap", "finite", "_row", "_corner", "_round_off", "_scales"),
+        *("unbalanced", "gap", "finite", "_row", "_corner", "_round_off", "_scales", "_change", "_size"),
     )
 
     def __init__(
@@ -134,7 +134,7 @@ class Equations:
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = evaluation.finite and math.isfinite(pressure)
-        self.bordered = evaluation.border(self._row, self._corner) if bordered is None and self.finite else bordered
+        self.bordered = bordered
         self._scales: tuple[float, float] | None = None
 
     @property
@@ -171,13 +171,19 @@ class Equations:
         return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
     def newton_step(self) -> tuple[Array, float]:
+        """The correction (dx, dP) at a finite state, by the factors given or else by those there."""
         gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
-        return self._factored.solve(self.unbalanced, -gap)
-
-    def size(self, dx: Array) -> float:
-        """:func:`relative_size` of a correction, less that of a component which is zero but for round-off and in balance to round-off."""
+        if self.bordered is None:
+            self.bordered, dx, dp, self._change, self._size = self.evaluation.step(self._row, self._corner, gap)
+            return dx, dp
         largest = self.evaluation.elements.largest
-        change, size = largest(dx), largest(self.x)
+        dx, dp = self.bordered.solve(self.unbalanced, -gap)
+        self._change, self._size = largest(dx), largest(self.x)
+        return dx, dp
+
+    def size(self) -> float:
+        """:func:`relative_size` of the correction, less that of a component which is zero but for round-off and in balance to round-off."""
+        change, size = self._change, self._size
         worst = _relative(change, size)
         if TOLERANCE < worst < math.inf:
             small = NEGLIGIBLE * max(*size, *change)
@@ -186,6 +192,11 @@ class Equations:
                 kept = [0.0 if n and r <= RESIDUAL else c for n, r, c in zip(negligible, self.residuals(), change, strict=True)]
                 return _relative((kept[0], kept[1]), size)
         return worst
+
+    def correction(self) -> float:
+        """:meth:`size` of the correction there."""
+        self.newton_step()
+        return self.size()
 
     def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
         return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, self.residual, self.gap, status)

@@ -121,25 +121,41 @@ int factor_general(Factor *f, const double *band)
     return 0;
 }
 
-/* two right-hand sides at once: each waits for its own last result, not for the other's */
+/*
+ * L x = b and D L^T x = b in place. Each unknown waits for the one before: that term is kept at hand and comes last, so that the others do
+ * not add to the wait.
+ */
+static inline double forward(const double *l, double last, double *x, int m)
+{
+    subtract(x + 2, last, l + 2, m - 1);
+    return x[1] -= l[1] * last;
+}
+
+static inline double backward(const double *l, double inverse, double last, double *x, int m)
+{
+    return x[0] = (x[0] * inverse - dot(l + 2, x + 2, m - 1)) - l[1] * last;
+}
+
+/* two right-hand sides at once, which do not wait for each other */
 EACH_PROCESSOR
 void factor_solve_both(const Factor *f, double *x, double *y)
 {
     const int n = f->n, kd = f->kd;
-    if (f->lu != NULL) {
+    if (f->lu != NULL || n < 2 || kd < 1) {
         factor_solve(f, x), factor_solve(f, y);
         return;
     }
-    for (int j = 0; j < n; j++) {
+    const double *l = f->lower;
+    double a = x[0], b = y[0];
+    for (int j = 0; j < n - 1; j++, l += kd + 1) {
         const int m = n - 1 - j < kd ? n - 1 - j : kd;
-        const double *column = f->lower + (size_t)j * (kd + 1) + 1;
-        subtract(x + j + 1, x[j], column, m), subtract(y + j + 1, y[j], column, m);
+        a = forward(l, a, x + j, m), b = forward(l, b, y + j, m);
     }
-    for (int j = n - 1; j >= 0; j--) {
+    a = x[n - 1] *= f->inverse[n - 1], b = y[n - 1] *= f->inverse[n - 1];
+    for (int j = n - 2; j >= 0; j--) {
         const int m = n - 1 - j < kd ? n - 1 - j : kd;
-        const double *column = f->lower + (size_t)j * (kd + 1) + 1;
-        const double a = dot(column, x + j + 1, m), b = dot(column, y + j + 1, m);
-        x[j] = x[j] * f->inverse[j] - a, y[j] = y[j] * f->inverse[j] - b;
+        l -= kd + 1;
+        a = backward(l, f->inverse[j], a, x + j, m), b = backward(l, f->inverse[j], b, y + j, m);
     }
 }
 
@@ -147,14 +163,21 @@ EACH_PROCESSOR
 void factor_solve(const Factor *f, double *x)
 {
     const int n = f->n, kd = f->kd;
+    if (f->lu == NULL && kd < 1) {
+        for (int j = 0; j < n; j++)
+            x[j] *= f->inverse[j];
+        return;
+    }
     if (f->lu == NULL) {
-        for (int j = 0; j < n; j++) {
-            const int m = n - 1 - j < kd ? n - 1 - j : kd;
-            subtract(x + j + 1, x[j], f->lower + (size_t)j * (kd + 1) + 1, m);
-        }
-        for (int j = n - 1; j >= 0; j--) {
-            const int m = n - 1 - j < kd ? n - 1 - j : kd;
-            x[j] = x[j] * f->inverse[j] - dot(f->lower + (size_t)j * (kd + 1) + 1, x + j + 1, m);
+        const double *l = f->lower;
+        double a = n > 0 ? x[0] : 0.0;
+        for (int j = 0; j < n - 1; j++, l += kd + 1)
+            a = forward(l, a, x + j, n - 1 - j < kd ? n - 1 - j : kd);
+        if (n > 0)
+            a = x[n - 1] *= f->inverse[n - 1];
+        for (int j = n - 2; j >= 0; j--) {
+            l -= kd + 1;
+            a = backward(l, f->inverse[j], a, x + j, n - 1 - j < kd ? n - 1 - j : kd);
         }
         return;
     }

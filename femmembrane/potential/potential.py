@@ -7,6 +7,7 @@ CasADi differentiates the densities at a point twice. Assembly is a constant lin
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -45,7 +46,7 @@ class Evaluation:
 
     __slots__ = (
         *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient", "unbalanced"),
-        *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative"),
+        *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative", "_known"),
     )
 
     def __init__(
@@ -66,6 +67,7 @@ class Evaluation:
         self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
         self._band: Array | None = None
         self._negative: int | None = None
+        self._known: dict[str, float] | None = None
 
     @property
     def force_density(self) -> Array:
@@ -81,6 +83,14 @@ class Evaluation:
     def stress(self) -> Array:
         """Principal mechanical stresses at the quadrature points, shape (2, n_points)."""
         return self._densities[N_FORCE + N_STIFFNESS :]
+
+    def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
+        """A number that belongs to this state, computed when first asked for under its name."""
+        if self._known is None:
+            self._known = {}
+        if name not in self._known:
+            self._known[name] = compute(self)
+        return self._known[name]
 
     @property
     def band(self) -> Array:

@@ -72,8 +72,9 @@ def flat_state(potential: Potential) -> State:
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:
     """Mesh-independent inner product of (x, P) and (y, Q), in units of the membrane's own size: mean over the reference area of the
     displacements, plus P Q."""
-    square = potential.space.unit**2
-    return band_inner(potential.mass, potential.space.half_bandwidth, x, y) / (potential.area * square) + p * q * square
+    space = potential.space
+    square = space.unit**2
+    return band_inner(potential.mass, space.half_bandwidth, x, y) / (potential.area * square) + p * q * square
 
 
 def distance(potential: Potential, x: Array, y: Array) -> float:
@@ -91,11 +92,9 @@ class Predictor:
     slope: list[Array] = field(default_factory=list)
 
     def append(self, sigma: float, x: Array, pressure: float, dx: Array, dp: float) -> None:
-        self.sigma.append(sigma)
-        self.point.append(_joined(x, pressure))
-        self.slope.append(_joined(dx, dp))
-        for memory in (self.sigma, self.point, self.slope):
-            del memory[:-2]
+        self.sigma = [*self.sigma[-1:], sigma]
+        self.point = [*self.point[-1:], _joined(x, pressure)]
+        self.slope = [*self.slope[-1:], _joined(dx, dp)]
 
     def predict(self, sigma: float) -> tuple[Array, float]:
         """(x, P) at sigma: a cubic through the last two points, or the tangent at the only one."""

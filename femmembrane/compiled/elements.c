@@ -63,26 +63,52 @@ static inline void add_product(Lanes *sum, double a, const double *x)
 #endif
 }
 
-/* sum[r][l] = sum_k m[r][k] x[k][l] for four rows; those beyond the last one are readable, and nobody reads their sums */
-static inline void rows_times(const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+static inline void rows_at_once(int rows, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
 {
     Lanes s[TOGETHER];
     memset(s, 0, sizeof s);
     for (int k = 0; k < depth; k++, x += next)
-        for (int r = 0; r < TOGETHER; r++)
+        for (int r = 0; r < rows; r++)
             add_product(&s[r], m[r * depth + k], x);
     memcpy(sum, s, sizeof s);
 }
 
-/* sum[c][l] = sum_k m[k] x[k][c][l] for four columns, likewise */
-static inline void row_times(const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+static inline void columns_at_once(int columns, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
 {
     Lanes s[TOGETHER];
     memset(s, 0, sizeof s);
     for (int k = 0; k < depth; k++, x += next)
-        for (int c = 0; c < TOGETHER; c++)
+        for (int c = 0; c < columns; c++)
             add_product(&s[c], m[k], x + c * LANES);
     memcpy(sum, s, sizeof s);
+}
+
+/* the loops over few rows or columns are unrolled where their number is known */
+#define UNROLLED(FUNCTION, NUMBER, ...)                                                                                                    \
+    switch (NUMBER) {                                                                                                                      \
+    case 1:                                                                                                                                \
+        FUNCTION(1, __VA_ARGS__);                                                                                                          \
+        break;                                                                                                                             \
+    case 2:                                                                                                                                \
+        FUNCTION(2, __VA_ARGS__);                                                                                                          \
+        break;                                                                                                                             \
+    case 3:                                                                                                                                \
+        FUNCTION(3, __VA_ARGS__);                                                                                                          \
+        break;                                                                                                                             \
+    default:                                                                                                                               \
+        FUNCTION(TOGETHER, __VA_ARGS__);                                                                                                   \
+    }
+
+/* sum[r][l] = sum_k m[r][k] x[k][l] for the first TOGETHER of so many rows */
+static inline void rows_times(int rows, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    UNROLLED(rows_at_once, rows, m, depth, x, next, sum)
+}
+
+/* sum[c][l] = sum_k m[k] x[k][c][l] for the first TOGETHER of so many columns */
+static inline void row_times(int columns, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    UNROLLED(columns_at_once, columns, m, depth, x, next, sum)
 }
 
 /* out[r][e] = sum_k m[r][k] x[k][e]; x is readable up to the next multiple of LANES */
@@ -92,7 +118,7 @@ static inline void product(const double *m, int rows, int depth, const double *x
     for (Py_ssize_t g = 0; g < lanes; g += LANES) {
         const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
         for (int first = 0; first < rows; first += TOGETHER) {
-            rows_times(m + first * depth, depth, x + g, ldx, sum);
+            rows_times(rows - first, m + first * depth, depth, x + g, ldx, sum);
             for (int r = first; r < first + TOGETHER && r < rows; r++)
                 memcpy(out + r * lanes + g, sum[r - first], sizeof(double) * valid);
         }
@@ -109,7 +135,7 @@ static inline void integrate(const Elements *s, const double *transposed, const 
         const int32_t *gather = s->gather + (first + g) * 2 * nl;
         for (int component = 0; component < 2; component++)
             for (int i = 0; i < nl; i += TOGETHER) {
-                rows_times(transposed + i * depth, depth, density + component * depth * lanes + g, lanes, sum);
+                rows_times(nl - i, transposed + i * depth, depth, density + component * depth * lanes + g, lanes, sum);
                 for (int r = i; r < i + TOGETHER && r < nl; r++)
                     for (int l = 0; l < valid; l++)
                         target[gather[l * 2 * nl + component * nl + r]] += sum[r - i][l];
@@ -233,9 +259,9 @@ EACH_PROCESSOR static void assemble(const Elements *s, const double *density, do
                     }
                 }
             for (int i = from; i < from + nl; i++)
-                for (int j = i; j < 2 * nl; j += TOGETHER) { /* beyond the last column lies the next row, and nobody reads its sums */
+                for (int j = i; j < 2 * nl; j += TOGETHER) {
                     double sum[TOGETHER][LANES];
-                    row_times(s->transposed + (i - from) * depth, depth, t + j * LANES, 2 * nl * LANES, sum);
+                    row_times(2 * nl - j, s->transposed + (i - from) * depth, depth, t + j * LANES, 2 * nl * LANES, sum);
                     for (int c = j; c < j + TOGETHER && c < 2 * nl; c++, place += LANES)
                         for (int l = 0; l < LANES; l++)
                             lower[place[l]] += sum[c - j][l];
@@ -317,12 +343,12 @@ static int elements_fill(Elements *s, const double *data, const int64_t *gather,
     const Py_ssize_t ne = s->n_elements, cells = (Py_ssize_t)2 * nq * nl;
     const Py_ssize_t most = POINTS / nq < LANES ? LANES : POINTS / nq / LANES * LANES;
     s->block = ne < most ? ne : most;
-    const size_t points = (size_t)s->block * nq, spare = TOGETHER * 2 * (nq + nl); /* what TOGETHER reads beyond the last row */
-    s->data = doubles(s->n_data * s->n_points), s->table = doubles(3 * cells + spare), s->local = doubles(4 * points);
+    const size_t points = (size_t)s->block * nq;
+    s->data = doubles(s->n_data * s->n_points), s->table = doubles(3 * cells), s->local = doubles(4 * points);
     s->gather = malloc(sizeof(int32_t) * (ne * 2 * nl + 1)), s->field = malloc(s->n_free + 1);
     s->place = malloc(sizeof(int32_t) * ((ne + LANES) * nl * (2 * nl + 1)));
     s->scalars = doubles(s->tape.n_scalars + 2), s->registers = doubles((s->tape.n_registers - s->n_data - 4) * points);
-    s->scratch = doubles((size_t)(N_STIFF * nq + 2 * nq * 2 * nl + TOGETHER) * LANES), s->sums = doubles(2 * (s->n_free + 1));
+    s->scratch = doubles((size_t)(N_STIFF * nq + 2 * nq * 2 * nl) * LANES), s->sums = doubles(2 * (s->n_free + 1));
     s->pointers = calloc(s->tape.n_registers + 1, sizeof(double *)), s->coefficients = doubles(2 * nl * s->block);
     if (!(s->data && s->table && s->local && s->gather && s->place && s->field && s->scalars && s->registers && s->scratch && s->sums && s->pointers &&
           s->coefficients)) {
@@ -405,10 +431,14 @@ static PyObject *elements_new(PyTypeObject *type, PyObject *args, PyObject *kwar
 /* 1 if all are numbers */
 static int all_finite(const double *x, Py_ssize_t n)
 {
-    double sum = 0.0; /* x - x is 0 of a number, and no number otherwise */
-    for (Py_ssize_t i = 0; i < n; i++)
-        sum += x[i] - x[i];
-    return sum == 0.0;
+    double sums[8] = {0}; /* x - x is 0 of a number, and no number otherwise */
+    Py_ssize_t i = 0;
+    for (; i + 8 <= n; i += 8)
+        for (int l = 0; l < 8; l++)
+            sums[l] += x[i + l] - x[i + l];
+    for (; i < n; i++)
+        sums[0] += x[i] - x[i];
+    return total(sums, 8) == 0.0;
 }
 
 /* evaluate(x, pressure, factor, forces, densities): (elastic, magnetic, volume, whether gradients and second derivatives are numbers) */

@@ -126,7 +126,7 @@ class ArcLengthControl:
     predicted_pressure: float
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
-        value = self.dual @ (x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
+        value = self.dual.dot(x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
         return float(value), self.dual, self.dual_pressure
 
 

@@ -102,7 +102,7 @@ class Predictor:
             z = self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
         else:
             h = self.sigma[1] - self.sigma[0]
-            z = hermite(self.point[0], h * self.slope[0], self.point[1], h * self.slope[1], (sigma - self.sigma[0]) / h)
+            z = hermite(self.point[0], self.slope[0], self.point[1], self.slope[1], (sigma - self.sigma[0]) / h, h)
         return z[:-1], float(z[-1])
 
 
@@ -112,8 +112,12 @@ def _joined(x: Array, last: float) -> Array:
     return z
 
 
-def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float) -> Array:
-    """Cubic with values and slopes at t = 0 and t = 1; extrapolates beyond."""
+def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float, length: float = 1.0) -> Array:
+    """Cubic with values and slopes, per unit of a length, at t = 0 and t = 1; extrapolates beyond."""
     back = t - 1
     at_a = (1 + 2 * t) * back * back
-    return at_a * a + (t * back * back) * slope_a + (1 - at_a) * b + (t * t * back) * slope_b
+    z = at_a * a
+    z += (length * t * back * back) * slope_a
+    z += (1 - at_a) * b
+    z += (length * t * t * back) * slope_b
+    return z

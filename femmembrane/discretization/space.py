@@ -95,7 +95,8 @@ class Space(Numbering):
 
     def axis_heights(self, x: Array) -> list[float]:
         """Heights of the nodes on the axis and of rigid discs across it."""
-        return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
+        n = self.n_free
+        return [height + float(x[k]) if k < n else height for k, height in self._axis]
 
     def extend(self, x: Array) -> Array:
         """Free coefficients with the zero of the supports appended, so that ``extend(x)[numbers]`` covers all nodes."""

@@ -45,7 +45,7 @@ class Evaluation:
     """
 
     __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient", "unbalanced"),
+        *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
         *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative", "_known"),
     )
 
@@ -63,8 +63,7 @@ class Evaluation:
         factor: float,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.gradient, self.volume_gradient, self.unbalanced = self._forces = forces
-        self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
+        self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
         self._band: Array | None = None
         self._negative: int | None = None
         self._known: dict[str, float] | None = None
@@ -83,6 +82,18 @@ class Evaluation:
     def stress(self) -> Array:
         """Principal mechanical stresses at the quadrature points, shape (2, n_points)."""
         return self._densities[N_FORCE + N_STIFFNESS :]
+
+    @property
+    def gradient(self) -> Array:
+        return self._forces[0]
+
+    @property
+    def volume_gradient(self) -> Array:
+        return self._forces[1]
+
+    @property
+    def unbalanced(self) -> Array:
+        return self._forces[2]
 
     def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
         """A number that belongs to this state, computed when first asked for under its name."""

@@ -113,11 +113,11 @@ def correct(
 
 
 class Equations:
-    """Residuals and bordered factors at one state; ``unbalanced`` is P V' - E'."""
+    """Residuals and bordered factors at one state."""
 
     __slots__ = (
         *("potential", "control", "x", "pressure", "evaluation", "bordered"),
-        *("unbalanced", "gap", "finite", "_row", "_corner", "_round_off", "_scales", "_change", "_size"),
+        *("gap", "finite", "_row", "_corner", "_round_off", "_scales", "_change", "_size"),
     )
 
     def __init__(
@@ -130,7 +130,6 @@ class Equations:
         bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        self.unbalanced = evaluation.unbalanced
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = evaluation.finite and math.isfinite(pressure)
@@ -164,7 +163,7 @@ class Equations:
         return worst if worst < np.inf else np.inf
 
     def residuals(self) -> tuple[float, float]:
-        return residuals_over(self.evaluation.elements.largest(self.unbalanced), self.scales)
+        return residuals_over(self.evaluation.elements.largest(self.evaluation.unbalanced), self.scales)
 
     def balanced(self, dp: float) -> bool:
         """Whether a correction of P changes no force."""
@@ -177,7 +176,7 @@ class Equations:
             self.bordered, dx, dp, self._change, self._size = self.evaluation.step(self._row, self._corner, gap)
             return dx, dp
         largest = self.evaluation.elements.largest
-        dx, dp = self.bordered.solve(self.unbalanced, -gap)
+        dx, dp = self.bordered.solve(self.evaluation.unbalanced, -gap)
         self._change, self._size = largest(dx), largest(self.x)
         return dx, dp
 

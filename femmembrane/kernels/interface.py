@@ -73,7 +73,10 @@ class Elements(Protocol):
         """
 
     def assemble(self, densities: Array) -> Array:
-        """Band of the second derivatives among the densities of an evaluation, in LAPACK general storage, shape (3 kd + 1, n_free), Fortran order."""
+        """Band of the second derivatives among the densities of an evaluation.
+
+        In LAPACK general storage, shape (3 kd + 1, n_free), Fortran order.
+        """
 
     def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
         """Factors of [K, -V'; row, corner] with K assembled as by :meth:`assemble`."""

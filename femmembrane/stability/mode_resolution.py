@@ -66,7 +66,7 @@ def _size(values: Array) -> float:
 def unresolved_axisymmetric(space: Space, evaluation: Evaluation, mode: Array) -> float:
     """:func:`unresolved` for an axisymmetric mode."""
     shape = (space.n_quadrature, space.n_elements)
-    local = space.at_quadrature(mode).reshape(4, *shape)
+    local = evaluation.elements.at_quadrature(np.ascontiguousarray(mode)).reshape(4, *shape)
     of_state = evaluation.once("unresolved stress", lambda state: unresolved_stress(space, state.stress))
     return unresolved(space, evaluation.stiffness_density.reshape(-1, *shape), HESSIAN_PAIRS, local, of_state)
 

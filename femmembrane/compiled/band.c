@@ -9,17 +9,6 @@
 #define GROWTH 100.0
 #define SMALLEST 1e-11
 
-double dot(const double *a, const double *b, Py_ssize_t n)
-{
-    double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
-    Py_ssize_t i = 0;
-    for (; i + 4 <= n; i += 4)
-        s0 += a[i] * b[i], s1 += a[i + 1] * b[i + 1], s2 += a[i + 2] * b[i + 2], s3 += a[i + 3] * b[i + 3];
-    for (; i < n; i++)
-        s0 += a[i] * b[i];
-    return (s0 + s1) + (s2 + s3);
-}
-
 static inline void subtract(double *restrict y, double factor, const double *restrict x, int n)
 {
     for (int i = 0; i < n; i++)
@@ -49,11 +38,24 @@ void band_lower(const double *band, int n, int kd, double *lower)
         memcpy(lower + (size_t)j * (kd + 1), band + (size_t)j * (3 * kd + 1) + 2 * kd, sizeof(double) * (kd + 1));
 }
 
+/* the other way round, both triangles into zeros */
+void general_storage(const double *lower, int n, int kd, double *band)
+{
+    const int step = 3 * kd + 1;
+    for (int j = 0; j < n; j++) {
+        const double *column = lower + (size_t)j * (kd + 1);
+        memcpy(band + (size_t)j * step + 2 * kd, column, sizeof(double) * (kd + 1));
+        for (int k = 1; k <= kd && j + k < n; k++)
+            band[(size_t)(j + k) * step + 2 * kd - k] = column[k];
+    }
+}
+
 /*
  * Right-looking. Rounding disturbs the matrix by a few units in the last place of |L| |D| |L|^T, whose diagonal, the `terms`, is added up
  * on the way: where it exceeds that of the matrix by little, as for all definite matrices, the factors are those of a matrix next to the
  * given one. Elsewhere the answer is -1. Pivots that are rounding themselves have uncertain signs.
  */
+EACH_PROCESSOR
 int factor_symmetric(Factor *f)
 {
     const int n = f->n, kd = f->kd, depth = kd + 1;
@@ -81,6 +83,7 @@ int factor_symmetric(Factor *f)
     return 0;
 }
 
+EACH_PROCESSOR
 int factor_general(Factor *f, const double *band)
 {
     const int n = f->n, kd = f->kd, depth = 3 * kd + 1;
@@ -118,17 +121,63 @@ int factor_general(Factor *f, const double *band)
     return 0;
 }
 
+/*
+ * L x = b and D L^T x = b in place. Each unknown waits for the one before: that term is kept at hand and comes last, so that the others do
+ * not add to the wait.
+ */
+static inline double forward(const double *l, double last, double *x, int m)
+{
+    subtract(x + 2, last, l + 2, m - 1);
+    return x[1] -= l[1] * last;
+}
+
+static inline double backward(const double *l, double inverse, double last, double *x, int m)
+{
+    return x[0] = (x[0] * inverse - dot(l + 2, x + 2, m - 1)) - l[1] * last;
+}
+
+/* two right-hand sides at once, which do not wait for each other */
+EACH_PROCESSOR
+void factor_solve_both(const Factor *f, double *x, double *y)
+{
+    const int n = f->n, kd = f->kd;
+    if (f->lu != NULL || n < 2 || kd < 1) {
+        factor_solve(f, x), factor_solve(f, y);
+        return;
+    }
+    const double *l = f->lower;
+    double a = x[0], b = y[0];
+    for (int j = 0; j < n - 1; j++, l += kd + 1) {
+        const int m = n - 1 - j < kd ? n - 1 - j : kd;
+        a = forward(l, a, x + j, m), b = forward(l, b, y + j, m);
+    }
+    a = x[n - 1] *= f->inverse[n - 1], b = y[n - 1] *= f->inverse[n - 1];
+    for (int j = n - 2; j >= 0; j--) {
+        const int m = n - 1 - j < kd ? n - 1 - j : kd;
+        l -= kd + 1;
+        a = backward(l, f->inverse[j], a, x + j, m), b = backward(l, f->inverse[j], b, y + j, m);
+    }
+}
+
+EACH_PROCESSOR
 void factor_solve(const Factor *f, double *x)
 {
     const int n = f->n, kd = f->kd;
+    if (f->lu == NULL && kd < 1) {
+        for (int j = 0; j < n; j++)
+            x[j] *= f->inverse[j];
+        return;
+    }
     if (f->lu == NULL) {
-        for (int j = 0; j < n; j++) {
-            const int m = n - 1 - j < kd ? n - 1 - j : kd;
-            subtract(x + j + 1, x[j], f->lower + (size_t)j * (kd + 1) + 1, m);
-        }
-        for (int j = n - 1; j >= 0; j--) {
-            const int m = n - 1 - j < kd ? n - 1 - j : kd;
-            x[j] = x[j] * f->inverse[j] - dot(f->lower + (size_t)j * (kd + 1) + 1, x + j + 1, m);
+        const double *l = f->lower;
+        double a = n > 0 ? x[0] : 0.0;
+        for (int j = 0; j < n - 1; j++, l += kd + 1)
+            a = forward(l, a, x + j, n - 1 - j < kd ? n - 1 - j : kd);
+        if (n > 0)
+            a = x[n - 1] *= f->inverse[n - 1];
+        for (int j = n - 2; j >= 0; j--) {
+            l -= kd + 1;
+            a = backward(l, f->inverse[j], a, x + j, n - 1 - j < kd ? n - 1 - j : kd);
         }
         return;
     }
@@ -148,6 +197,7 @@ void factor_solve(const Factor *f, double *x)
 }
 
 /* y = A x, or |A| |x|, for lower bands whose columns are `step` apart */
+EACH_PROCESSOR
 void band_product(const double *lower, Py_ssize_t step, int n, int kd, const double *x, double *y, int magnitudes)
 {
     memset(y, 0, sizeof(double) * n);
@@ -192,8 +242,7 @@ void border_set(Border *b, double corner)
     const int n = b->factor.n;
     memcpy(b->v, b->row, sizeof(double) * n);
     memcpy(b->w, b->column, sizeof(double) * n);
-    factor_solve(&b->factor, b->v);
-    factor_solve(&b->factor, b->w);
+    factor_solve_both(&b->factor, b->v, b->w);
     b->corner = corner;
     b->delta_v = corner - dot(b->v, b->column, n);
     b->delta_w = corner - dot(b->row, b->w, n);
@@ -213,13 +262,15 @@ double border_solve(const Border *b, const double *f, double g, double *x)
 }
 
 /* x . A y */
+EACH_PROCESSOR
 static double inner(const double *lower, Py_ssize_t step, int n, int kd, const double *x, const double *y)
 {
     double sum = 0.0;
     for (int j = 0; j < n; j++) {
         const double *column = lower + (size_t)j * step;
         const int m = n - 1 - j < kd ? n - 1 - j : kd;
-        sum += x[j] * (column[0] * y[j] + dot(column + 1, y + j + 1, m)) + y[j] * dot(column + 1, x + j + 1, m);
+        const double of_y = dot(column + 1, y + j + 1, m), of_x = x == y ? of_y : dot(column + 1, x + j + 1, m);
+        sum += x[j] * (column[0] * y[j] + of_y) + y[j] * of_x;
     }
     return sum;
 }

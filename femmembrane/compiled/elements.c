@@ -10,6 +10,8 @@
 #include <string.h>
 
 #define LANES 4
+/* rows or columns of a product that are summed at once: each sum is a chain of additions, and a processor has room for several */
+#define TOGETHER 4
 /* points evaluated in one go: a block and the registers of the tape stay in the processor's cache */
 #define POINTS 256
 /* rows of the point function: energies and volume, two gradients, second derivatives, stresses */
@@ -23,6 +25,7 @@ typedef struct {
     int n_data;
     double *data;         /* point data, block after block, (n_data, n_quadrature, elements of the block) */
     int32_t *gather;      /* (n_elements, 2 n_local); n_free is what is held at zero */
+    int32_t *place;       /* where the entries of LANES elements go in the lower band, in the order of assembly */
     uint8_t *field;       /* (n_free) 0 for u, 1 for w */
     double *table;        /* (2 n_quadrature, n_local) values, then slopes */
     double *transposed;   /* (n_local, 2 n_quadrature) */
@@ -39,37 +42,104 @@ static double *doubles(size_t count)
 
 /* ---- evaluation ---------------------------------------------------------------------------------------------------------------- */
 
-/* out[r][e] = sum_k m[r][k] x[k][e]; x is readable up to the next multiple of LANES */
-static void product(const double *m, int rows, int depth, const double *x, Py_ssize_t ldx, double *out, Py_ssize_t lanes)
+/* LANES numbers in one register or two: compilers left alone with the loop take the wrong one of those around it to vectors */
+#if defined(__GNUC__)
+typedef double Lanes __attribute__((vector_size(8 * LANES)));
+#else
+typedef struct {
+    double v[LANES];
+} Lanes;
+#endif
+
+static inline void add_product(Lanes *sum, double a, const double *x)
 {
+#if defined(__GNUC__)
+    Lanes v;
+    memcpy(&v, x, sizeof v);
+    *sum += a * v;
+#else
+    for (int l = 0; l < LANES; l++)
+        sum->v[l] += a * x[l];
+#endif
+}
+
+static inline void rows_at_once(int rows, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    Lanes s[TOGETHER];
+    memset(s, 0, sizeof s);
+    for (int k = 0; k < depth; k++, x += next)
+        for (int r = 0; r < rows; r++)
+            add_product(&s[r], m[r * depth + k], x);
+    memcpy(sum, s, sizeof s);
+}
+
+static inline void columns_at_once(int columns, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    Lanes s[TOGETHER];
+    memset(s, 0, sizeof s);
+    for (int k = 0; k < depth; k++, x += next)
+        for (int c = 0; c < columns; c++)
+            add_product(&s[c], m[k], x + c * LANES);
+    memcpy(sum, s, sizeof s);
+}
+
+/* the loops over few rows or columns are unrolled where their number is known */
+#define UNROLLED(FUNCTION, NUMBER, ...)                                                                                                    \
+    switch (NUMBER) {                                                                                                                      \
+    case 1:                                                                                                                                \
+        FUNCTION(1, __VA_ARGS__);                                                                                                          \
+        break;                                                                                                                             \
+    case 2:                                                                                                                                \
+        FUNCTION(2, __VA_ARGS__);                                                                                                          \
+        break;                                                                                                                             \
+    case 3:                                                                                                                                \
+        FUNCTION(3, __VA_ARGS__);                                                                                                          \
+        break;                                                                                                                             \
+    default:                                                                                                                               \
+        FUNCTION(TOGETHER, __VA_ARGS__);                                                                                                   \
+    }
+
+/* sum[r][l] = sum_k m[r][k] x[k][l] for the first TOGETHER of so many rows */
+static inline void rows_times(int rows, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    UNROLLED(rows_at_once, rows, m, depth, x, next, sum)
+}
+
+/* sum[c][l] = sum_k m[k] x[k][c][l] for the first TOGETHER of so many columns */
+static inline void row_times(int columns, const double *m, int depth, const double *x, Py_ssize_t next, double sum[TOGETHER][LANES])
+{
+    UNROLLED(columns_at_once, columns, m, depth, x, next, sum)
+}
+
+/* out[r][e] = sum_k m[r][k] x[k][e]; x is readable up to the next multiple of LANES */
+static inline void product(const double *m, int rows, int depth, const double *x, Py_ssize_t ldx, double *out, Py_ssize_t lanes)
+{
+    double sum[TOGETHER][LANES];
     for (Py_ssize_t g = 0; g < lanes; g += LANES) {
         const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
-        for (int r = 0; r < rows; r++) {
-            double sum[LANES] = {0};
-            for (int k = 0; k < depth; k++)
-                for (int l = 0; l < LANES; l++)
-                    sum[l] += m[r * depth + k] * x[k * ldx + g + l];
-            memcpy(out + r * lanes + g, sum, sizeof(double) * valid);
+        for (int first = 0; first < rows; first += TOGETHER) {
+            rows_times(rows - first, m + first * depth, depth, x + g, ldx, sum);
+            for (int r = first; r < first + TOGETHER && r < rows; r++)
+                memcpy(out + r * lanes + g, sum[r - first], sizeof(double) * valid);
         }
     }
 }
 
 /* target[unknown] += sum_k transposed[i][k] density[k][e] for both components of the elements from `first` on */
-static void integrate(const Elements *s, const double *transposed, const double *density, Py_ssize_t first, Py_ssize_t lanes, double *target)
+static inline void integrate(const Elements *s, const double *transposed, const double *density, Py_ssize_t first, Py_ssize_t lanes, double *target)
 {
     const int nl = s->n_local, depth = 2 * s->n_quadrature;
+    double sum[TOGETHER][LANES];
     for (Py_ssize_t g = 0; g < lanes; g += LANES) {
         const int valid = lanes - g < LANES ? (int)(lanes - g) : LANES;
         const int32_t *gather = s->gather + (first + g) * 2 * nl;
-        for (int i = 0; i < 2 * nl; i++) {
-            const double *row = transposed + (i % nl) * depth, *d = density + (i < nl ? 0 : depth * lanes) + g;
-            double sum[LANES] = {0};
-            for (int k = 0; k < depth; k++)
-                for (int l = 0; l < LANES; l++)
-                    sum[l] += row[k] * d[k * lanes + l];
-            for (int l = 0; l < valid; l++)
-                target[gather[l * 2 * nl + i]] += sum[l];
-        }
+        for (int component = 0; component < 2; component++)
+            for (int i = 0; i < nl; i += TOGETHER) {
+                rows_times(nl - i, transposed + i * depth, depth, density + component * depth * lanes + g, lanes, sum);
+                for (int r = i; r < i + TOGETHER && r < nl; r++)
+                    for (int l = 0; l < valid; l++)
+                        target[gather[l * 2 * nl + component * nl + r]] += sum[r - i][l];
+            }
     }
 }
 
@@ -85,7 +155,7 @@ static double total(const double *x, Py_ssize_t n)
     return (s[0] + s[1]) + (s[2] + s[3]);
 }
 
-static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py_ssize_t lanes)
+EACH_PROCESSOR static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py_ssize_t lanes)
 {
     const int nl = s->n_local, nq = s->n_quadrature;
     for (Py_ssize_t e = 0; e < lanes; e++) {
@@ -97,8 +167,8 @@ static void interpolate(const Elements *s, const double *x, Py_ssize_t first, Py
     product(s->table, 2 * nq, nl, s->coefficients + nl * s->block, s->block, s->local + 2 * nq * lanes, lanes);
 }
 
-/* values (3), gradients (2, n_free) and densities (20, n_points) at the unknowns x; parameters of the point function in place */
-static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *gradients, double *density)
+/* values (3), forces (3, n_free: E', V', P V' - E') and densities (20, n_points) at the unknowns x; parameters of the point function in place */
+EACH_PROCESSOR static void evaluate(const Elements *s, const double *x, const double *parameters, double *values, double *forces, double *density)
 {
     const int nq = s->n_quadrature;
     const Tape *tape = &s->tape;
@@ -129,12 +199,14 @@ static void evaluate(const Elements *s, const double *x, const double *parameter
                 memcpy(density + r * s->n_elements + first, force + r * lanes, sizeof(double) * lanes);
         }
     }
-    memcpy(gradients, s->sums, sizeof(double) * n);
-    memcpy(gradients + n, s->sums + spare, sizeof(double) * n);
+    for (Py_ssize_t i = 0; i < n; i++) {
+        const double elastic = forces[i] = s->sums[i], volume = forces[n + i] = s->sums[spare + i];
+        forces[2 * n + i] = parameters[0] * volume - elastic;
+    }
 }
 
 /* largest sum of absolute forces |E'| + |P| |V'| that meet at an unknown of each component */
-static void force_scale(const Elements *s, const double *force, double pressure, double scale[2])
+EACH_PROCESSOR static void force_scale(const Elements *s, const double *force, double pressure, double scale[2])
 {
     const int nq = s->n_quadrature, rows = 4 * nq;
     const Py_ssize_t step = s->block, ne = s->n_elements;
@@ -160,15 +232,16 @@ static void force_scale(const Elements *s, const double *force, double pressure,
 /* where a pair of local variables (u, u_x, w, w_x) stands among the second derivatives */
 static const int PAIR[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
 
-/* Added to the lower triangle by columns, at (column step + row - column + above), and where `above` is not 0 to the upper one as well. */
-static void assemble(const Elements *s, const double *density, double *band, Py_ssize_t step, Py_ssize_t above)
+/* Added to the lower triangle by columns of depth kd + 1; one more entry behind them takes what belongs to no pair of unknowns. */
+EACH_PROCESSOR static void assemble(const Elements *s, const double *density, double *lower)
 {
     const int nl = s->n_local, nq = s->n_quadrature, depth = 2 * nq;
-    const Py_ssize_t ne = s->n_elements, n = s->n_free;
+    const Py_ssize_t ne = s->n_elements;
+    const int32_t *place = s->place;
     double *d = s->scratch, *t = d + N_STIFF * nq * LANES; /* t: (2 n_quadrature, 2 n_local, lanes) */
+    memset(lower, 0, sizeof(double) * ((s->kd + 1) * s->n_free + 1));
     for (Py_ssize_t first = 0; first < ne; first += LANES) {
         const int valid = ne - first < LANES ? (int)(ne - first) : LANES;
-        const int32_t *gather = s->gather + first * 2 * nl;
         for (int r = 0; r < N_STIFF * nq; r++)
             for (int l = 0; l < valid; l++)
                 d[r * LANES + l] = density[r * ne + first + l];
@@ -186,21 +259,12 @@ static void assemble(const Elements *s, const double *density, double *band, Py_
                     }
                 }
             for (int i = from; i < from + nl; i++)
-                for (int j = i; j < 2 * nl; j++) {
-                    double sum[LANES] = {0};
-                    const double *row = s->transposed + (i - from) * depth, *column = t + j * LANES;
-                    for (int k = 0; k < depth; k++)
+                for (int j = i; j < 2 * nl; j += TOGETHER) {
+                    double sum[TOGETHER][LANES];
+                    row_times(2 * nl - j, s->transposed + (i - from) * depth, depth, t + j * LANES, 2 * nl * LANES, sum);
+                    for (int c = j; c < j + TOGETHER && c < 2 * nl; c++, place += LANES)
                         for (int l = 0; l < LANES; l++)
-                            sum[l] += row[k] * column[k * 2 * nl * LANES + l];
-                    for (int l = 0; l < valid; l++) {
-                        const Py_ssize_t a = gather[l * 2 * nl + i], b = gather[l * 2 * nl + j];
-                        if (a < n && b < n) {
-                            const Py_ssize_t low = a < b ? a : b, high = a < b ? b : a;
-                            band[low * step + above + high - low] += sum[l];
-                            if (above && a != b)
-                                band[high * step + above + low - high] += sum[l];
-                        }
-                    }
+                            lower[place[l]] += sum[c - j][l];
                 }
         }
     }
@@ -226,14 +290,13 @@ static int bordered(const Elements *s, Border *b, const double *stiffness, const
     const Py_ssize_t n = s->n_free;
     free(f->lu), free(f->swaps);
     f->lu = NULL, f->swaps = NULL;
-    memset(f->lower, 0, sizeof(double) * (s->kd + 1) * n);
-    assemble(s, stiffness, f->lower, s->kd + 1, 0);
+    assemble(s, stiffness, f->lower);
     if (factor_symmetric(f) < 0) {
-        const int depth = 3 * s->kd + 1;
-        double *band = doubles((size_t)depth * n);
+        double *band = doubles((size_t)(3 * s->kd + 1) * n);
         if (band == NULL)
             return -1;
-        assemble(s, stiffness, band, depth, 2 * s->kd);
+        assemble(s, stiffness, f->lower);
+        general_storage(f->lower, (int)n, s->kd, band);
         const int failed = factor_general(f, band);
         free(band);
         if (failed)
@@ -252,10 +315,26 @@ static void elements_dealloc(PyObject *self)
     Elements *s = (Elements *)self;
     PyTypeObject *type = Py_TYPE(self);
     tape_free(&s->tape);
-    free(s->data), free(s->gather), free(s->field), free(s->table), free(s->scalars), free(s->registers), free(s->scratch);
+    free(s->data), free(s->gather), free(s->place), free(s->field), free(s->table), free(s->scalars), free(s->registers), free(s->scratch);
     free(s->sums), free(s->pointers), free(s->local), free(s->coefficients);
     PyObject_Free(self);
     Py_DECREF(type);
+}
+
+static void fill_places(Elements *s)
+{
+    const int nl = s->n_local;
+    const Py_ssize_t n = s->n_free, nobody = n * (s->kd + 1);
+    int32_t *place = s->place;
+    for (Py_ssize_t first = 0; first < s->n_elements; first += LANES)
+        for (int i = 0; i < 2 * nl; i++)
+            for (int j = i; j < 2 * nl; j++)
+                for (Py_ssize_t e = first; e < first + LANES; e++) {
+                    const int32_t *gather = s->gather + e * 2 * nl;
+                    const Py_ssize_t a = e < s->n_elements ? gather[i] : n, b = e < s->n_elements ? gather[j] : n;
+                    const Py_ssize_t low = a < b ? a : b, high = a < b ? b : a;
+                    *place++ = (int32_t)(high < n ? low * (s->kd + 1) + high - low : nobody);
+                }
 }
 
 static int elements_fill(Elements *s, const double *data, const int64_t *gather, const double *table, const int64_t *field)
@@ -267,10 +346,11 @@ static int elements_fill(Elements *s, const double *data, const int64_t *gather,
     const size_t points = (size_t)s->block * nq;
     s->data = doubles(s->n_data * s->n_points), s->table = doubles(3 * cells), s->local = doubles(4 * points);
     s->gather = malloc(sizeof(int32_t) * (ne * 2 * nl + 1)), s->field = malloc(s->n_free + 1);
+    s->place = malloc(sizeof(int32_t) * ((ne + LANES) * nl * (2 * nl + 1)));
     s->scalars = doubles(s->tape.n_scalars + 2), s->registers = doubles((s->tape.n_registers - s->n_data - 4) * points);
     s->scratch = doubles((size_t)(N_STIFF * nq + 2 * nq * 2 * nl) * LANES), s->sums = doubles(2 * (s->n_free + 1));
     s->pointers = calloc(s->tape.n_registers + 1, sizeof(double *)), s->coefficients = doubles(2 * nl * s->block);
-    if (!(s->data && s->table && s->local && s->gather && s->field && s->scalars && s->registers && s->scratch && s->sums && s->pointers &&
+    if (!(s->data && s->table && s->local && s->gather && s->place && s->field && s->scalars && s->registers && s->scratch && s->sums && s->pointers &&
           s->coefficients)) {
         PyErr_NoMemory();
         return -1;
@@ -300,6 +380,7 @@ static int elements_fill(Elements *s, const double *data, const int64_t *gather,
                     return -1;
                 }
             }
+    fill_places(s);
     for (Py_ssize_t i = 0; i < s->n_free; i++)
         s->field[i] = field[i] != 0;
     for (Py_ssize_t first = 0; first < ne; first += s->block) {
@@ -350,13 +431,17 @@ static PyObject *elements_new(PyTypeObject *type, PyObject *args, PyObject *kwar
 /* 1 if all are numbers */
 static int all_finite(const double *x, Py_ssize_t n)
 {
-    double sum = 0.0; /* x - x is 0 of a number, and no number otherwise */
-    for (Py_ssize_t i = 0; i < n; i++)
-        sum += x[i] - x[i];
-    return sum == 0.0;
+    double sums[8] = {0}; /* x - x is 0 of a number, and no number otherwise */
+    Py_ssize_t i = 0;
+    for (; i + 8 <= n; i += 8)
+        for (int l = 0; l < 8; l++)
+            sums[l] += x[i + l] - x[i + l];
+    for (; i < n; i++)
+        sums[0] += x[i] - x[i];
+    return total(sums, 8) == 0.0;
 }
 
-/* evaluate(x, pressure, factor, gradients, densities): (elastic, magnetic, volume, whether gradients and second derivatives are numbers) */
+/* evaluate(x, pressure, factor, forces, densities): (elastic, magnetic, volume, whether gradients and second derivatives are numbers) */
 static PyObject *elements_evaluate(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
@@ -365,7 +450,7 @@ static PyObject *elements_evaluate(PyObject *self, PyObject *args)
     double values[3], parameters[2];
     if (!PyArg_ParseTuple(args, "OddOO", &o[0], &parameters[0], &parameters[1], &o[1], &o[2]))
         return NULL;
-    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &g, 'd', 2 * s->n_free, 1, "gradients") < 0 ||
+    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &g, 'd', 3 * s->n_free, 1, "forces") < 0 ||
                     take_array(o[2], &d, 'd', N_DENSITY * s->n_points, 1, "densities") < 0;
     if (!bad) {
         const double *stiffness = (double *)d.buf + N_FORCE * s->n_points;
@@ -395,7 +480,7 @@ static PyObject *elements_at_quadrature(PyObject *self, PyObject *args)
     return bad ? NULL : Py_NewRef(Py_None);
 }
 
-/* assemble(stiffness, band): the second derivatives into general band storage, shape (n_free, 3 kd + 1) of zeros */
+/* assemble(densities, band): the second derivatives of an evaluation into general band storage, shape (n_free, 3 kd + 1) of zeros */
 static PyObject *elements_assemble(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
@@ -403,13 +488,19 @@ static PyObject *elements_assemble(PyObject *self, PyObject *args)
     Py_buffer d = {0}, b = {0};
     if (!PyArg_ParseTuple(args, "OO", &density, &band))
         return NULL;
-    const int bad = take_array(density, &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
+    double *lower = NULL;
+    const int bad = take_array(density, &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0 ||
                     take_array(band, &b, 'd', s->n_free * (3 * s->kd + 1), 1, "band") < 0;
-    if (!bad)
-        assemble(s, d.buf, b.buf, 3 * s->kd + 1, 2 * s->kd);
+    if (!bad && (lower = doubles((size_t)(s->kd + 1) * s->n_free + 1)) != NULL) {
+        assemble(s, (double *)d.buf + N_FORCE * s->n_points, lower);
+        general_storage(lower, (int)s->n_free, s->kd, b.buf);
+    }
     PyBuffer_Release(&d), PyBuffer_Release(&b);
     if (bad)
         return NULL;
+    if (lower == NULL)
+        return PyErr_NoMemory();
+    free(lower);
     Py_RETURN_NONE;
 }
 
@@ -435,40 +526,66 @@ static PyObject *elements_force_scale(PyObject *self, PyObject *args)
     double pressure, scale[2];
     if (!PyArg_ParseTuple(args, "Od", &source, &pressure))
         return NULL;
-    const int bad = take_array(source, &d, 'd', N_FORCE * s->n_points, 0, "densities") < 0;
+    const int bad = take_array(source, &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0;
     if (!bad)
         force_scale(s, d.buf, pressure, scale);
     PyBuffer_Release(&d);
     return bad ? NULL : Py_BuildValue("(dd)", scale[0], scale[1]);
 }
 
-/* border(stiffness, volume gradient, row, corner): factors of [K, -V'; row, corner] */
+/* a new object with the factors of [K, -V'; row, corner], or NULL with an exception set */
+static BorderObject *new_border(const Elements *s, const double *densities, const double *volume_gradient, const double *row, double corner)
+{
+    BorderObject *border = PyObject_New(BorderObject, types.border);
+    int without = border == NULL || border_init(&border->border, (int)s->n_free, s->kd) < 0;
+    if (!without) {
+        memcpy(border->border.row, row, sizeof(double) * s->n_free);
+        without = bordered(s, &border->border, densities + N_FORCE * s->n_points, volume_gradient, corner) < 0;
+    }
+    if (without) {
+        Py_CLEAR(border);
+        PyErr_NoMemory();
+    }
+    return border;
+}
+
+/* border(densities, volume gradient, row, corner): factors of [K, -V'; row, corner] */
 static PyObject *elements_border(PyObject *self, PyObject *args)
 {
     const Elements *s = (Elements *)self;
-    const Py_ssize_t n = s->n_free;
     PyObject *o[3];
     Py_buffer d = {0}, v = {0}, r = {0};
     double corner;
     if (!PyArg_ParseTuple(args, "OOOd", &o[0], &o[1], &o[2], &corner))
         return NULL;
     BorderObject *border = NULL;
-    const int bad = take_array(o[0], &d, 'd', N_STIFF * s->n_points, 0, "stiffness") < 0 ||
-                    take_array(o[1], &v, 'd', n, 0, "volume gradient") < 0 || take_array(o[2], &r, 'd', n, 0, "row") < 0;
-    if (!bad) {
-        border = PyObject_New(BorderObject, types.border);
-        int without = border == NULL || border_init(&border->border, (int)n, s->kd) < 0;
-        if (!without) {
-            memcpy(border->border.row, r.buf, sizeof(double) * n);
-            without = bordered(s, &border->border, d.buf, v.buf, corner) < 0;
-        }
-        if (without) {
-            Py_CLEAR(border);
-            PyErr_NoMemory();
-        }
-    }
+    if (take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") == 0 && take_array(o[1], &v, 'd', s->n_free, 0, "volume gradient") == 0 &&
+        take_array(o[2], &r, 'd', s->n_free, 0, "row") == 0)
+        border = new_border(s, d.buf, v.buf, r.buf, corner);
     PyBuffer_Release(&d), PyBuffer_Release(&v), PyBuffer_Release(&r);
     return (PyObject *)border;
+}
+
+/* step(densities, forces, row, corner, gap, x, dx): (Border, dp, largest of dx, largest of x) with the solution for (P V' - E', -gap) in dx */
+static PyObject *elements_step(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    const Py_ssize_t n = s->n_free;
+    PyObject *o[5];
+    Py_buffer d = {0}, f = {0}, r = {0}, x = {0}, dx = {0};
+    double corner, gap, dp = 0.0, change[2], size[2];
+    if (!PyArg_ParseTuple(args, "OOOddOO", &o[0], &o[1], &o[2], &corner, &gap, &o[3], &o[4]))
+        return NULL;
+    BorderObject *border = NULL;
+    if (take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") == 0 && take_array(o[1], &f, 'd', 3 * n, 0, "forces") == 0 &&
+        take_array(o[2], &r, 'd', n, 0, "row") == 0 && take_array(o[3], &x, 'd', n, 0, "x") == 0 && take_array(o[4], &dx, 'd', n, 1, "dx") == 0)
+        border = new_border(s, d.buf, (double *)f.buf + n, r.buf, corner);
+    if (border != NULL) {
+        dp = border_solve(&border->border, (double *)f.buf + 2 * n, -gap, dx.buf);
+        largest(s, dx.buf, change), largest(s, x.buf, size);
+    }
+    PyBuffer_Release(&d), PyBuffer_Release(&f), PyBuffer_Release(&r), PyBuffer_Release(&x), PyBuffer_Release(&dx);
+    return border == NULL ? NULL : Py_BuildValue("Nd(dd)(dd)", border, dp, change[0], change[1], size[0], size[1]);
 }
 
 static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadrature, METH_VARARGS, NULL},
@@ -477,6 +594,7 @@ static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadratur
                                          {"largest", elements_largest, METH_O, NULL},
                                          {"force_scale", elements_force_scale, METH_VARARGS, NULL},
                                          {"border", elements_border, METH_VARARGS, NULL},
+                                         {"step", elements_step, METH_VARARGS, NULL},
                                          {NULL, NULL, 0, NULL}};
 static PyType_Slot elements_slots[] = {
     {Py_tp_new, elements_new}, {Py_tp_dealloc, elements_dealloc}, {Py_tp_methods, elements_methods}, {0, NULL}};

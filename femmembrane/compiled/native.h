@@ -66,6 +66,8 @@ int factor_band(Factor *f, const double *band);
 /* P A = L U of general storage, copied; 0, or -1 without memory */
 int factor_general(Factor *f, const double *band);
 void factor_solve(const Factor *f, double *x);
+void factor_solve_both(const Factor *f, double *x, double *y);
+void general_storage(const double *lower, int n, int kd, double *band);
 void band_lower(const double *band, int n, int kd, double *lower);
 void band_product(const double *lower, Py_ssize_t step, int n, int kd, const double *x, double *y, int magnitudes);
 
@@ -79,7 +81,16 @@ int border_init(Border *b, int n, int kd);
 void border_free(Border *b);
 void border_set(Border *b, double corner);
 double border_solve(const Border *b, const double *f, double g, double *x);
-double dot(const double *a, const double *b, Py_ssize_t n);
+static inline double dot(const double *a, const double *b, Py_ssize_t n)
+{
+    double s0 = 0.0, s1 = 0.0, s2 = 0.0, s3 = 0.0;
+    Py_ssize_t i = 0;
+    for (; i + 4 <= n; i += 4)
+        s0 += a[i] * b[i], s1 += a[i + 1] * b[i + 1], s2 += a[i + 2] * b[i + 2], s3 += a[i + 3] * b[i + 3];
+    for (; i < n; i++)
+        s0 += a[i] * b[i];
+    return (s0 + s1) + (s2 + s3);
+}
 PyObject *product_function(PyObject *module, PyObject *args);
 PyObject *inner_function(PyObject *module, PyObject *args);
 

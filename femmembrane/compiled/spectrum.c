@@ -11,6 +11,7 @@ typedef struct {
     double compliance;
 } Pencil;
 
+EACH_PROCESSOR
 static void shift_band(const Pencil *p, double shift, double *lower)
 {
     const int kd = p->kd;
@@ -66,6 +67,7 @@ static void project(const Pencil *p, double *x)
 }
 
 /* sqrt(sum of x^2/diagonal of M) */
+EACH_PROCESSOR
 static double size_of(const Pencil *p, const double *x)
 {
     double sum = 0.0;
@@ -108,6 +110,7 @@ typedef struct {
 } Tolerances;
 
 /* 1 and value, error and the number of eigenvalues clearly below (-1: not certain); 0 when nothing was found, -1 without memory */
+EACH_PROCESSOR
 static int rayleigh(const Pencil *p, double *mode, const Tolerances *t, Border *b, double *work, double *value, double *error, int *below)
 {
     const int n = p->n, kd = p->kd, step = p->step;

@@ -138,7 +138,7 @@ class Numbering:
         self.wall = self.between(walls) if any(walls) else None
         self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
 
-    @property
+    @cached_property
     def units(self) -> dict[str, float]:
         """Natural units of pressures, volumes and heights of this membrane, in the units of R0."""
         return {"pressure": 1 / self.unit, "volume": self.unit**3, "center_height": self.unit}

@@ -70,6 +70,7 @@ class Space(Numbering):
         flat = np.where((row < self.n_free) & (column < self.n_free), column * depth + 2 * kd + row - column, spare)
         self._band_index = flat.reshape(n_local**2, -1).ravel()
         self._gather_flat = self.gather.ravel()
+        self._known_ends: dict[int, tuple[int, int, float, float]] = {}
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
@@ -82,14 +83,20 @@ class Space(Numbering):
 
     def end_position(self, x: Array, k: int) -> tuple[float, float]:
         """Deformed position (rho, eta) of the k-th end of elements, whose coefficients are its displacement."""
-        k %= self.n_elements + 1
-        u, w = (float(x[i]) if i < self.n_free else 0.0 for i in self.numbers[self.nodes[self.degree * k]])
-        R, Z = self._end_positions[:, k]
-        return float(R + u), float(Z + w)
+        i, j, R, Z = self._known_ends.get(k) or self._end(k)
+        return R + float(x[i]) if i < self.n_free else R, Z + float(x[j]) if j < self.n_free else Z
+
+    def _end(self, k: int) -> tuple[int, int, float, float]:
+        """Unknowns and position at rest of an end of elements, looked up once."""
+        at = k % (self.n_elements + 1)
+        i, j = self.numbers[self.nodes[self.degree * at]]
+        R, Z = self._end_positions[:, at]
+        return self._known_ends.setdefault(k, (int(i), int(j), float(R), float(Z)))
 
     def axis_heights(self, x: Array) -> list[float]:
         """Heights of the nodes on the axis and of rigid discs across it."""
-        return [height + (float(x[k]) if k < self.n_free else 0.0) for k, height in self._axis]
+        n = self.n_free
+        return [height + float(x[k]) if k < n else height for k, height in self._axis]
 
     def extend(self, x: Array) -> Array:
         """Free coefficients with the zero of the supports appended, so that ``extend(x)[numbers]`` covers all nodes."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..discretization.space import Space
-from .interface import N_DENSITIES, Array, Elements, Pencil, PointFunction, Rayleigh, Tape
+from .interface import N_DENSITIES, Array, Elements, Pencil, PointFunction, Rayleigh, Step, Tape
 from .numpy_kernels import NumpyKernels
 
 if TYPE_CHECKING:
     from .. import _native
 
 #: version of the interface, as the sources in ``compiled/`` state it; raised there and here when arguments or answers change
-INTERFACE = 3
+INTERFACE = 4
 
 
 class CompiledKernels:
@@ -95,17 +95,22 @@ class CompiledElements:
         return local
 
     def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
-        gradients, densities = np.empty((2, self._n_free)), np.empty((N_DENSITIES, self._n_points))
-        elastic, magnetic, volume, finite = self.native.evaluate(x, pressure, factor, gradients, densities)
-        return elastic, magnetic, volume, finite, gradients, densities
+        forces, densities = np.empty((3, self._n_free)), np.empty((N_DENSITIES, self._n_points))
+        elastic, magnetic, volume, finite = self.native.evaluate(x, pressure, factor, forces, densities)
+        return elastic, magnetic, volume, finite, forces, densities
 
-    def assemble(self, stiffness: Array) -> Array:
+    def assemble(self, densities: Array) -> Array:
         band = np.zeros((self._n_free, self._depth))
-        self.native.assemble(stiffness, band)
+        self.native.assemble(densities, band)
         return band.T
 
-    def border(self, stiffness: Array, volume_gradient: Array, row: Array, corner: float) -> CompiledBorder:
-        return CompiledBorder(self.native.border(stiffness, volume_gradient, row, corner))
+    def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> CompiledBorder:
+        return CompiledBorder(self.native.border(densities, volume_gradient, row, corner))
+
+    def step(self, densities: Array, forces: Array, row: Array, corner: float, gap: float, x: Array) -> Step:
+        dx = np.empty(self._n_free)
+        border, dp, change, size = self.native.step(densities, forces, row, corner, gap, x, dx)
+        return CompiledBorder(border), dx, dp, change, size
 
 
 class CompiledFactor:
@@ -131,5 +136,5 @@ class CompiledBorder:
         self._own = own
 
     def solve(self, f: Array, g: float) -> tuple[Array, float]:
-        x = np.empty_like(f)
+        x = np.empty(len(f))
         return x, self._own.solve(f, g, x)

@@ -47,6 +47,10 @@ class Border(Protocol):
     def solve(self, f: Array, g: float) -> tuple[Array, float]: ...
 
 
+#: factors, corrections of x and of P, sizes of the former and of x
+Step = tuple[Border, Array, float, tuple[float, float], tuple[float, float]]
+
+
 class Elements(Protocol):
     """The elements of one space with one point function; vectors are contiguous."""
 
@@ -57,27 +61,43 @@ class Elements(Protocol):
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
 
     def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
-        """Elastic and magnetic energy, volume, whether all derivatives are numbers, the gradients of E and V, and the densities.
+        """Elastic and magnetic energy, volume, whether all derivatives are numbers, the forces, and the densities.
 
         Returns
         -------
         elastic, magnetic, volume : float
         finite : bool
-        gradients : ndarray, shape (2, n_free)
+        forces : ndarray, shape (3, n_free)
+            E', V' and what is out of balance, P V' - E'.
         densities : ndarray, shape (N_DENSITIES, n_points)
         """
 
-    def assemble(self, stiffness: Array) -> Array:
-        """Band of the second derivatives in LAPACK general storage, shape (3 kd + 1, n_free), Fortran order."""
+    def assemble(self, densities: Array) -> Array:
+        """Band of the second derivatives among the densities of an evaluation.
 
-    def border(self, stiffness: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
-        """Factors of [K, -V'; row, corner] with K assembled of the second derivatives."""
+        In LAPACK general storage, shape (3 kd + 1, n_free), Fortran order.
+        """
+
+    def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
+        """Factors of [K, -V'; row, corner] with K assembled as by :meth:`assemble`."""
+
+    def step(self, densities: Array, forces: Array, row: Array, corner: float, gap: float, x: Array) -> Step:
+        """What a bordered Newton step at x takes, in one call: :meth:`border`, its solution for (P V' - E', -gap), and sizes.
+
+        Returns
+        -------
+        border : Border
+        dx : ndarray, shape (n_free,)
+        dp : float
+        change, size : tuple of float
+            :meth:`largest` of dx and of x.
+        """
 
     def largest(self, x: Array) -> tuple[float, float]:
         """Largest sizes of a vector of unknowns among u and among w; infinite where there is no number."""
 
-    def force_scale(self, force_density: Array, pressure: float) -> tuple[float, float]:
-        """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
+    def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
+        """Sum of the absolute forces that meet at the nodes, largest for u and for w, from the densities of an evaluation."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from ..discretization.space import Space
 from .bordered import BorderedFactor
-from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Array, Border, Pencil, PointFunction, Rayleigh
+from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Array, Border, Pencil, PointFunction, Rayleigh, Step
 
 
 class NumpyKernels:
@@ -61,22 +61,29 @@ class NumpyElements:
         with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy the answer is NaN, which the caller judges
             elastic, magnetic, volume = out[:N_SUMS].sum(axis=1).tolist()
             gradients = self._space.assemble_vectors(densities[:N_FORCE].reshape(self._force_shape))
+            forces = np.concatenate([gradients, [pressure * gradients[1] - gradients[0]]])
         finite = bool(np.isfinite(gradients).all() and np.isfinite(densities[N_FORCE : N_FORCE + N_STIFFNESS]).all())
-        return elastic, magnetic, volume, finite, gradients, densities
+        return elastic, magnetic, volume, finite, forces, densities
 
-    def assemble(self, stiffness: Array) -> Array:
+    def assemble(self, densities: Array) -> Array:
+        stiffness = densities[N_FORCE : N_FORCE + N_STIFFNESS]
         with np.errstate(invalid="ignore"):
             return self._space.assemble_band(stiffness.reshape(-1, self._space.n_elements))
 
-    def border(self, stiffness: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
-        return BorderedFactor(NumpyFactor(self.assemble(stiffness)), -volume_gradient, row, corner)
+    def border(self, densities: Array, volume_gradient: Array, row: Array, corner: float) -> Border:
+        return BorderedFactor(NumpyFactor(self.assemble(densities)), -volume_gradient, row, corner)
+
+    def step(self, densities: Array, forces: Array, row: Array, corner: float, gap: float, x: Array) -> Step:
+        border = self.border(densities, forces[1], row, corner)
+        dx, dp = border.solve(forces[2], -gap)
+        return border, dx, dp, self.largest(dx), self.largest(x)
 
     def largest(self, x: Array) -> tuple[float, float]:
         u, w = (float(np.abs(x[index]).max(initial=0.0)) for index in self._space.fields)
         return u if u < np.inf else np.inf, w if w < np.inf else np.inf
 
-    def force_scale(self, force_density: Array, pressure: float) -> tuple[float, float]:
-        density = np.abs(force_density).reshape(self._force_shape)
+    def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
+        density = np.abs(densities[:N_FORCE]).reshape(self._force_shape)
         return self.largest(self._space.assemble_magnitude(density[0] + abs(pressure) * density[1]))
 
 

@@ -7,6 +7,7 @@ CasADi differentiates the densities at a point twice. Assembly is a constant lin
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
 from ..physics.tension_field import strain_energy
@@ -35,7 +36,8 @@ class Evaluation:
     Attributes
     ----------
     elastic_energy, magnetic_energy, volume : float
-    gradient, volume_gradient : ndarray, shape (n_free,)
+    gradient, volume_gradient, unbalanced : ndarray, shape (n_free,)
+        E', V' and P V' - E' at the pressure of the evaluation.
     finite : bool
         Whether all derivatives are numbers: outside the domain of the energy they are not.
     elements : Elements
@@ -43,8 +45,8 @@ class Evaluation:
     """
 
     __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite", "gradient", "volume_gradient"),
-        *("potential", "elements", "factor", "_densities", "_band", "_negative"),
+        *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
+        *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative", "_known"),
     )
 
     def __init__(
@@ -54,17 +56,17 @@ class Evaluation:
         magnetic_energy: float,
         volume: float,
         finite: bool,
-        gradients: Array,
+        forces: Array,
         densities: Array,
         potential: Potential,
         elements: Elements,
         factor: float,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.gradient, self.volume_gradient = gradients[0], gradients[1]
-        self.potential, self.elements, self.factor, self._densities = potential, elements, factor, densities
+        self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
         self._band: Array | None = None
         self._negative: int | None = None
+        self._known: dict[str, float] | None = None
 
     @property
     def force_density(self) -> Array:
@@ -82,10 +84,30 @@ class Evaluation:
         return self._densities[N_FORCE + N_STIFFNESS :]
 
     @property
+    def gradient(self) -> Array:
+        return self._forces[0]
+
+    @property
+    def volume_gradient(self) -> Array:
+        return self._forces[1]
+
+    @property
+    def unbalanced(self) -> Array:
+        return self._forces[2]
+
+    def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
+        """A number that belongs to this state, computed when first asked for under its name."""
+        if self._known is None:
+            self._known = {}
+        if name not in self._known:
+            self._known[name] = compute(self)
+        return self._known[name]
+
+    @property
     def band(self) -> Array:
         """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
         if self._band is None:
-            self._band = self.elements.assemble(self._densities[N_FORCE : N_FORCE + N_STIFFNESS])
+            self._band = self.elements.assemble(self._densities)
         return self._band
 
     @property
@@ -97,7 +119,15 @@ class Evaluation:
 
     def border(self, row: Array, corner: float) -> Border:
         """Factors of :attr:`band` with the column -V' and the row of a control."""
-        return self.elements.border(self._densities[N_FORCE : N_FORCE + N_STIFFNESS], self.volume_gradient, row, corner)
+        return self.elements.border(self._densities, self.volume_gradient, row, corner)
+
+    def step(self, row: Array, corner: float, gap: float) -> Step:
+        """The bordered Newton step at x and its factors, see :meth:`.Elements.step`."""
+        return self.elements.step(self._densities, self._forces, row, corner, gap, self.x)
+
+    def force_scale(self, pressure: float) -> tuple[float, float]:
+        """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
+        return self.elements.force_scale(self._densities, pressure)
 
     @property
     def load_energy(self) -> float:
@@ -129,6 +159,7 @@ class Potential:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
         self.sources = acting_sources(scene.sources, scene.susceptibility)  # nothing is built of others
+        self._circles = tuple(circle for source in self.sources for circle in source.circles)
         self.loads = tuple(load for load in scene.loads if load.acts)
         if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
             advice = (
@@ -245,14 +276,14 @@ class Potential:
         """Whether the membrane went through a source between two states. No branch does, but a step on a coarse mesh may jump across."""
         if not self.sources:
             return False
-        heights = zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True)
-        if any(source.passed(*pair) for pair in heights for source in self.sources):
-            return True
-        circles = [circle for source in self.sources for circle in source.circles]
-        if not circles:
+        for heights in zip(self.space.axis_heights(before), self.space.axis_heights(after), strict=True):
+            for source in self.sources:
+                if source.passed(*heights):
+                    return True
+        if not self._circles:
             return False
         meridians = [self._meridian(x) for x in (before, after)]
-        return any(swept(meridians[0], meridians[1], circle) for circle in circles)
+        return any(swept(meridians[0], meridians[1], circle) for circle in self._circles)
 
     def _meridian(self, x: Array) -> Array:
         """Positions (rho, eta) of the nodes, shape (2, n)."""
@@ -266,7 +297,7 @@ class Potential:
 
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
-        return self.elements.force_scale(evaluation.force_density, pressure)
+        return evaluation.force_scale(pressure)
 
     def response(self, e1: Array, e2: Array) -> Array:
         """Principal mechanical stresses and their derivatives with respect to the Hencky strains.

@@ -151,7 +151,7 @@ class Equilibrium:
         InputError
             For an unknown control, or for arguments that do not go together.
         """
-        if not isinstance(control, str | None) or not isinstance(azimuthal, (int, np.integer)):
+        if not (control is None or isinstance(control, str)) or not isinstance(azimuthal, (int, np.integer)):
             raise InputError(
                 "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
                 control or azimuthal,

@@ -159,7 +159,7 @@ class Gas:
         return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(slots=True, eq=False)
 class ArcLengthControl:
     """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0. ``dual`` is the tangent with the inner product already applied."""
 
@@ -169,7 +169,7 @@ class ArcLengthControl:
     predicted_pressure: float
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
-        value = self.dual @ (x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
+        value = self.dual.dot(x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
         return float(value), self.dual, self.dual_pressure
 
 

@@ -85,7 +85,7 @@ def correct(
         if not equations.finite:
             return NewtonResult(x, pressure, evaluation, None, iteration, np.inf, np.inf, equations.gap, Status.NOT_CONVERGED)
         dx, dp = equations.newton_step()
-        size = equations.size(dx)
+        size = equations.size()
         close, previously_close = size <= tolerance, previous <= tolerance
         done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
         done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
@@ -105,7 +105,7 @@ def correct(
         foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
         if foretold <= tolerance / 10:
             last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
-            if last.finite and (left := last.size(last.newton_step()[0])) <= tolerance / 10:
+            if last.finite and (left := last.correction()) <= tolerance / 10:
                 result = last.result(iteration, left, Status.CONVERGED)
                 if result.residual <= RESIDUAL:
                     return result
@@ -113,11 +113,11 @@ def correct(
 
 
 class Equations:
-    """Residuals and bordered factors at one state; ``unbalanced`` is P V' - E'."""
+    """Residuals and bordered factors at one state."""
 
     __slots__ = (
         *("potential", "control", "x", "pressure", "evaluation", "bordered"),
-        *("unbalanced", "gap", "finite", "_row", "_corner", "_round_off", "_scales"),
+        *("gap", "finite", "_row", "_corner", "_round_off", "_scales", "_change", "_size"),
     )
 
     def __init__(
@@ -130,11 +130,10 @@ class Equations:
         bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = evaluation.finite and math.isfinite(pressure)
-        self.bordered = evaluation.border(self._row, self._corner) if bordered is None and self.finite else bordered
+        self.bordered = bordered
         self._scales: tuple[float, float] | None = None
 
     @property
@@ -154,7 +153,7 @@ class Equations:
     def scales(self) -> tuple[float, float]:
         """The forces that meet at a node, largest along u and along w."""
         if self._scales is None:
-            self._scales = self.potential.force_scale(self.evaluation, self.pressure)
+            self._scales = self.evaluation.force_scale(self.pressure)
         return self._scales
 
     @property
@@ -164,22 +163,26 @@ class Equations:
         return worst if worst < np.inf else np.inf
 
     def residuals(self) -> tuple[float, float]:
-        return residuals_over(self.evaluation.elements.largest(self.unbalanced), self.scales)
+        return residuals_over(self.evaluation.elements.largest(self.evaluation.unbalanced), self.scales)
 
     def balanced(self, dp: float) -> bool:
         """Whether a correction of P changes no force."""
         return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
     def newton_step(self) -> tuple[Array, float]:
-        gap = (
-            self.gap if abs(self.gap) > self._round_off else 0.0
-        )  # next to rest the correction would move the membrane by more than its displacement
-        return self._factored.solve(self.unbalanced, -gap)
-
-    def size(self, dx: Array) -> float:
         """:func:`relative_size` of a correction, without a component that is zero and in balance to round-off."""
+        gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
+        if self.bordered is None:
+            self.bordered, dx, dp, self._change, self._size = self.evaluation.step(self._row, self._corner, gap)
+            return dx, dp
         largest = self.evaluation.elements.largest
-        change, size = largest(dx), largest(self.x)
+        dx, dp = self.bordered.solve(self.evaluation.unbalanced, -gap)
+        self._change, self._size = largest(dx), largest(self.x)
+        return dx, dp
+
+    def size(self) -> float:
+        """:func:`relative_size` of the correction, less that of a component which is zero but for round-off and in balance to round-off."""
+        change, size = self._change, self._size
         worst = _relative(change, size)
         if TOLERANCE < worst < math.inf:
             small = NEGLIGIBLE * max(*size, *change)
@@ -188,6 +191,11 @@ class Equations:
                 kept = [0.0 if n and r <= RESIDUAL else c for n, r, c in zip(negligible, self.residuals(), change, strict=True)]
                 return _relative((kept[0], kept[1]), size)
         return worst
+
+    def correction(self) -> float:
+        """:meth:`size` of the correction there."""
+        self.newton_step()
+        return self.size()
 
     def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
         return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, self.residual, self.gap, status)
@@ -212,7 +220,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     while length > 1e-4:
         x, pressure = equations.x + length * dx, equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
-        unbalanced = pressure * new.volume_gradient - new.gradient
+        unbalanced = new.unbalanced
         if max(potential.largest(unbalanced)) < np.inf:
             gap = equations.control.equation(potential.space, x, pressure, new)[0]
             left = potential.largest(equations.simplified_step(unbalanced, gap))
@@ -232,17 +240,17 @@ def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
     (du, dw), (u, w) = change, size
     if du == math.inf or dw == math.inf:
         return math.inf
-    a = du / max(u, du) if du else 0.0
-    b = dw / max(w, dw) if dw else 0.0
-    return max(a, b)
+    a = (du / u if du < u else 1.0) if du else 0.0
+    b = (dw / w if dw < w else 1.0) if dw else 0.0
+    return a if a > b else b
 
 
 def residuals_over(size: tuple[float, float], scales: tuple[float, float]) -> tuple[float, float]:
     """Out-of-balance forces along u and along w over the forces that meet at a node."""
     # a component without forces along it holds round-off of the other component
     least = _EPSILON * max(scales)
-    u, w = (r / max(s, least) if r else 0.0 for r, s in zip(size, scales, strict=True))
-    return u, w
+    (u, w), (scale_u, scale_w) = size, scales
+    return u / max(scale_u, least) if u else 0.0, w / max(scale_w, least) if w else 0.0
 
 
 def relative_residual(potential: Potential, residual: Array, evaluation: Evaluation, pressure: float) -> float:

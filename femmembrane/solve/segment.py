@@ -179,4 +179,4 @@ class Segment(Generic[Point]):
     def _predicted(self, share: float) -> Array:
         """What the cubic through both ends predicts."""
         a, b = self.a, self.b
-        return hermite(a.z, a.tangent * self.length, b.z, b.tangent * self.length, share)
+        return hermite(a.z, a.tangent, b.z, b.tangent, share, self.length)

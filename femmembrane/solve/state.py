@@ -75,8 +75,9 @@ def flat_state(potential: Potential, magnetic: float = 1.0) -> State:
 def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float:
     """Mesh-independent inner product of (x, P) and (y, Q), in units of the membrane's own size: mean over the reference area of the
     displacements, plus P Q."""
-    square = potential.space.unit**2
-    return band_inner(potential.mass, potential.space.half_bandwidth, x, y) / (potential.area * square) + p * q * square
+    space = potential.space
+    square = space.unit**2
+    return band_inner(potential.mass, space.half_bandwidth, x, y) / (potential.area * square) + p * q * square
 
 
 def distance(potential: Potential, x: Array, y: Array) -> float:
@@ -94,18 +95,16 @@ class Predictor:
     slope: list[Array] = field(default_factory=list)
 
     def append(self, sigma: float, z: Array, slope: Array) -> None:
-        self.sigma.append(sigma)
-        self.point.append(z)
-        self.slope.append(slope)
-        for memory in (self.sigma, self.point, self.slope):
-            del memory[:-2]
+        self.sigma = [*self.sigma[-1:], sigma]
+        self.point = [*self.point[-1:], z]
+        self.slope = [*self.slope[-1:], slope]
 
     def predict(self, sigma: float) -> Array:
         """z at sigma: a cubic through the last two points, or the tangent at the only one."""
         if len(self.sigma) == 1:
             return self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
         h = self.sigma[1] - self.sigma[0]
-        return hermite(self.point[0], h * self.slope[0], self.point[1], h * self.slope[1], (sigma - self.sigma[0]) / h)
+        return hermite(self.point[0], self.slope[0], self.point[1], self.slope[1], (sigma - self.sigma[0]) / h, h)
 
 
 def joined(x: Array, last: float) -> Array:
@@ -115,8 +114,12 @@ def joined(x: Array, last: float) -> Array:
     return z
 
 
-def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float) -> Array:
-    """Cubic with values and slopes at t = 0 and t = 1; extrapolates beyond."""
+def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float, length: float = 1.0) -> Array:
+    """Cubic with values and slopes, per unit of a length, at t = 0 and t = 1; extrapolates beyond."""
     back = t - 1
     at_a = (1 + 2 * t) * back * back
-    return at_a * a + (t * back * back) * slope_a + (1 - at_a) * b + (t * t * back) * slope_b
+    z = at_a * a
+    z += (length * t * back * back) * slope_a
+    z += (1 - at_a) * b
+    z += (length * t * t * back) * slope_b
+    return z

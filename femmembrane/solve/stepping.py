@@ -13,7 +13,6 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
-from .banded import BorderedFactor
 from .controls import Control
 from .newton import NewtonResult, correct
 from .state import Predictor, State, distance, joined
@@ -114,7 +113,7 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     """Derivative of (x, P) with respect to the parameter."""
     space, evaluation = potential.space, state.evaluation
     _, row, corner = control.equation(space, state.x, state.pressure, evaluation)
-    bordered = BorderedFactor(state.factor, -evaluation.volume_gradient, row, corner)
+    bordered = evaluation.border(row, corner)
     if parameter == "load":
         return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
     other = potential.evaluate(state.x, state.pressure, value + 1.0)  # the gradient is linear in the factor: an exact derivative

@@ -86,13 +86,17 @@ def _nearly_slack(evaluation: Evaluation) -> bool:
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation, an equilibrium or not, is ill-posed on its own mesh."""
     slack = potential.scene.tension_field
-    if not slack and evaluation.stress[0].min(initial=0.0) >= 0:  # the usual case needs no scale
+    if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
     scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
     r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
     if slack:
         r = np.append(r, _folds(potential, evaluation.x, scale))
     return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
+
+
+def _least_meridional(evaluation: Evaluation) -> float:
+    return float(evaluation.stress[0].min(initial=0.0))
 
 
 def compressed(potential: Potential, evaluation: Evaluation, component: int) -> IllPosed | None:

@@ -19,7 +19,7 @@ from ..results.verdict import Verdict
 from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, least_stress
 from ..threads import one_thread
 from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
-from .mode_resolution import unresolved
+from .mode_resolution import unresolved, unresolved_stress
 from .second_variation import PAIRS
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
 from .verdict import against, short_wave_verdict, verdict_from
@@ -119,7 +119,7 @@ def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float
     local = space.table[: 2 * space.n_quadrature, : space.degree + 1] @ layout.local(mode).reshape(3, space.degree + 1, -1)
     local = local.reshape(6, *space.R.shape)
     stress = np.stack([operator.response.s1, operator.response.s2])
-    return unresolved(space, operator.density, PAIRS, local, stress)
+    return unresolved(space, operator.density, PAIRS, local, unresolved_stress(space, stress))
 
 
 @dataclass(frozen=True)

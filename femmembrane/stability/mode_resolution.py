@@ -29,7 +29,7 @@ def small_eigenvalue(space: Space) -> float:
     return _SMALL * np.pi / space.reference_area
 
 
-def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...], local: Array, stress: Array) -> float:
+def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...], local: Array, of_state: float) -> float:
     """Part of a Rayleigh quotient that the mesh does not resolve.
 
     Parameters
@@ -40,8 +40,8 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
     pairs : tuple of (int, int)
     local : ndarray, shape (n_variables, n_quadrature, n_elements)
         Local variables of the mode, normalised in the mass.
-    stress : ndarray, shape (2, n_points)
-        Principal stresses of the state.
+    of_state : float
+        :func:`unresolved_stress` of the state.
     """
     first, second, times = _indices(pairs)
     products = local.take(first, axis=0)
@@ -49,10 +49,10 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
     products *= density
     products = products.reshape(len(times), -1)
     mode = _size(space.highest @ (times @ products).reshape(space.R.shape))
-    return float(mode + _of_state(space, stress) * _size(times @ np.abs(products, out=products)))
+    return float(mode + of_state * _size(times @ np.abs(products, out=products)))
 
 
-def _of_state(space: Space, stress: Array) -> float:
+def unresolved_stress(space: Space, stress: Array) -> float:
     """Relative part of the stresses of a state that the mesh does not resolve. Errors of the pressure and of moduli are smaller."""
     integrand = (stress[0] + stress[1]).reshape(space.R.shape)
     integrand *= space.area_weights
@@ -68,8 +68,9 @@ def _size(values: Array) -> float:
 def unresolved_axisymmetric(space: Space, evaluation: Evaluation, mode: Array) -> float:
     """:func:`unresolved` for an axisymmetric mode."""
     shape = (space.n_quadrature, space.n_elements)
-    local = space.at_quadrature(mode).reshape(4, *shape)
-    return unresolved(space, evaluation.stiffness_density.reshape(-1, *shape), HESSIAN_PAIRS, local, evaluation.stress)
+    local = evaluation.elements.at_quadrature(np.ascontiguousarray(mode)).reshape(4, *shape)
+    of_state = evaluation.once("unresolved stress", lambda state: unresolved_stress(space, state.stress))
+    return unresolved(space, evaluation.stiffness_density.reshape(-1, *shape), HESSIAN_PAIRS, local, of_state)
 
 
 @lru_cache(maxsize=8)

@@ -85,6 +85,27 @@ def test_evaluation_and_assembly(name):
         np.testing.assert_allclose(found.gradient, expected.gradient, rtol=0, atol=1e-13 * scale)
 
 
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_step_solves_the_bordered_system(name):
+    """[K, -V'; row, corner] (dx, dP) = (P V' - E', -gap) by the assembled band, in both implementations, with the sizes of dx and x."""
+    potential = potential_of(SHAPES[name])
+    x, gap, corner = dome(potential), 0.3, 0.7
+    for run in (lambda function: function(), in_numpy):
+        evaluation = run(lambda: potential.evaluate(x, 1.3))
+        row = evaluation.volume_gradient + 0.1
+        border, dx, dp, change, size = evaluation.step(row, corner, gap)
+        force = 1.3 * evaluation.volume_gradient - evaluation.gradient
+        np.testing.assert_array_equal(evaluation.unbalanced, force)
+        left = NumpyKernels().product(evaluation.band, potential.space.half_bandwidth, dx) - dp * evaluation.volume_gradient
+        np.testing.assert_allclose(left, force, rtol=0, atol=1e-10 * np.abs(force).max())
+        assert row @ dx + corner * dp == pytest.approx(-gap, rel=1e-10)
+        again, rate = border.solve(evaluation.unbalanced, -gap)
+        np.testing.assert_array_equal(again, dx)
+        assert rate == dp
+        for vector, largest in ((dx, change), (x, size)):
+            assert largest == tuple(np.abs(vector[index]).max(initial=0.0) for index in potential.space.fields)
+
+
 def test_blocks_are_met_whole_and_in_part():
     assert potential_of(SHAPES["many blocks"]).n_points > 2 * BLOCK
     assert potential_of(SHAPES["many blocks"]).space.n_elements % (BLOCK // 3 // 4 * 4) % 4 != 0
@@ -241,7 +262,7 @@ def test_every_operation_is_casadis():
         densities = np.empty((20, n))
         for first, second in ((0.3, -1.2), (800.0, 0.0)):
             parameters = np.array([first, second])
-            elements.evaluate(right.copy(), first, second, np.empty((2, n)), densities)
+            elements.evaluate(right.copy(), first, second, np.empty((3, n)), densities)
             exact = np.array(vectorise(function, n)(left[:, None], np.stack([right, *3 * [np.zeros(n)]]).T, parameters)).T
             np.testing.assert_allclose(densities, exact[3:], rtol=6e-16, atol=5e-324)
     assert space.n_elements == n
@@ -280,7 +301,7 @@ def test_wrong_arrays_are_refused():
     """Sizes and types are checked at the door: nothing is read or written out of bounds."""
     module, potential = NATIVE, potential_of(SHAPES["degree 6"])
     n = potential.space.n_free
-    elements, gradients, densities = potential.elements.native, np.empty((2, n)), np.empty((20, potential.n_points))
+    elements, gradients, densities = potential.elements.native, np.empty((3, n)), np.empty((20, potential.n_points))
     for x, room in ((np.zeros(n - 1), gradients), (np.zeros(n), gradients[:1]), (np.zeros(2 * n)[::2], gradients)):
         with pytest.raises((ValueError, BufferError)):
             elements.evaluate(x, 0.0, 1.0, room, densities)

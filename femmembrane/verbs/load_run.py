@@ -16,6 +16,7 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Array, potential_of
 from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
 from ..scene import MAX_STEPS, Scene
+from ..scene.run import AT_LIMIT
 from ..solve.controls import CONTROLS, ControlKind, Controlled, Gas
 from ..solve.load_path import SOLVERS, LoadPath, Turn
 from ..solve.state import State
@@ -24,8 +25,6 @@ from .arguments import check_height
 from .meshing import carried
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
-
-AT_LIMIT = ("stop", "jump")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ class LoadRequest(Request):
 
     @property
     def errors_at(self) -> str:
-        return self.held.name
+        return self.held.name if self.held.name in CONTROLS else "volume"
 
     def on(self, scene: Scene) -> Self:
         return replace(self, start=carried(self.start, scene))

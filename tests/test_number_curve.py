@@ -15,10 +15,12 @@ from femmembrane.solve.continuation import StepControl, Tracer, trace_points
 from femmembrane.solve.controls import CenterHeightControl, Control, Gas, PressureControl, VolumeControl
 from femmembrane.solve.newton import relative_residual
 from femmembrane.solve.number_curve import NUMBER, TURN, ControlledProblem, NumberPoint, first_controlled
-from femmembrane.solve.segment import Segment
+from femmembrane.solve.segment import Located, Segment
+from femmembrane.solve.special_points import branch_point
 from femmembrane.solve.state import Predictor
 
 from .cases import OGDEN, disc_scene
+from .test_switching import sphere
 
 SCENE = disc_scene(OGDEN, (200.0, 6.5), elements=16)
 STRENGTH = Parameter(SCENE, "source.0.strength")
@@ -108,6 +110,29 @@ def test_every_control_is_held_and_every_point_is_an_equilibrium_of_its_own_scen
             held = end.state.value_of(control) - control.amount if isinstance(control, Gas) else end.value(name) - getattr(eq, name)
             assert held == pytest.approx(0.0, abs=1e-10)
             assert out_of_balance(end) < 1e-10
+
+
+def test_another_branch_crosses_where_it_does_in_the_scene_of_that_number() -> None:
+    """Balloons that hold V = 25 lose their round shape at some modulus; for that modulus pears branch off at V = 25."""
+    balloon = sphere()
+    modulus = Parameter(balloon, "material.mu.0")
+    low, high = 0.96 * modulus.value, 1.04 * modulus.value
+    problem = ControlledProblem(Family(balloon, modulus.vary), VolumeControl(25.0), high - low, (low, high))
+    eq = fm.trace(balloon, start=20.0, until={"volume": 25.0}, special_points=False)[-1]
+    point = first_controlled(problem, eq.state, eq.pressure, modulus.value, -1)
+    found: list[Located[NumberPoint]] = []
+    for _, new in zip(range(30), trace_points(problem, point, Tracer(Predictor(), 0.02, StepControl(largest=0.1))), strict=False):
+        crossing = branch_point(Segment(problem, point, new))
+        found += [crossing] if crossing else []
+        point = new
+        if point.number == low:
+            break
+    (met,) = found
+    assert met.kind == "branch_point"
+    scene = modulus.scene_at(met.point.number)
+    pears = [p for p in fm.trace(scene, start=20.0, until={"volume": 30.0}).special_points or () if p.kind == "branch_point"]
+    assert [p.volume for p in pears] == pytest.approx([25.0], rel=1e-6)
+    assert met.error < 1e-5
 
 
 def test_a_quantity_takes_a_value_along_the_branch() -> None:

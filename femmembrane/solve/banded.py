@@ -42,6 +42,10 @@ class WideBorder:
         self._matrix[1:] = self._rows @ self._basis
         self._matrix[1:, 1:] += corner
 
+    def determinant_sign(self) -> int:
+        """Sign of the determinant over that of [K, b; b^T, 0], up to one that depends on k alone."""
+        return int(np.linalg.slogdet(self._matrix)[0])
+
     def solve(self, f: Array | None, h: list[float]) -> tuple[Array, Array]:
         """(x, y) for the right-hand side (f, h); None stands for f = 0."""
         first, slack = (np.zeros(len(self._basis)), 0.0) if f is None else self._deflated.solve(f, 0.0)

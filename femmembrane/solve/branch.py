@@ -26,7 +26,7 @@ FOLDS = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "cen
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
 #: the loosest tolerance: next to a crossing of branches no correction falls below round-off over the distance to it
-_AT_CROSSING = 1e-7
+AT_CROSSING = 1e-7
 
 
 class BranchProblem(CurveProblem[BranchPoint]):
@@ -70,7 +70,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def resolve(self, guess: Array, row: Array, near: BranchPoint) -> BranchPoint:
         # as good as round-off lets it be: the pressure of a fold is the last digit that tells its two sides apart
-        for tolerance in (_EXACT, TOLERANCE, _AT_CROSSING):
+        for tolerance in (_EXACT, TOLERANCE, AT_CROSSING):
             result = corrected(self.potential, guess, row, tolerance)
             if result.status is Status.CONVERGED:
                 return tangent_at(self.potential, State.of(result), near)
@@ -80,6 +80,12 @@ class BranchProblem(CurveProblem[BranchPoint]):
         pressure = value if quantity == "pressure" else near.state.pressure
         result = correct(self.potential, CONTROLS[quantity].at(value), near.state.x, pressure, tolerance=_EXACT)
         return tangent_at(self.potential, State.of(result), near) if result.status is Status.CONVERGED else None
+
+    def determinant_sign(self, point: BranchPoint) -> int:
+        """Of [K, -V'; tangent^T, tangent_P], whose determinant is det K (tangent_P + tangent^T K^-1 V')."""
+        factor, row = point.state.factor, point.dual
+        solved = factor.solve(point.state.evaluation.volume_gradient)
+        return factor.determinant_sign() * (1 if row[-1] + row[:-1] @ solved > 0 else -1)
 
     def forbids(self, before: BranchPoint, after: BranchPoint) -> bool:
         return self.potential.passed_source(before.state.x, after.state.x)

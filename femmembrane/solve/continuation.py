@@ -134,6 +134,7 @@ class CurveProblem(ABC, Generic[Point]):
         None where the corrector does not converge.
         """
 
+    @abstractmethod
     def resolve(self, guess: Array, row: Array, near: Point) -> Point:
         """As :meth:`correct`, as exactly as round-off lets it be.
 
@@ -142,14 +143,14 @@ class CurveProblem(ABC, Generic[Point]):
         SolveError
             Where the corrector does not converge.
         """
-        point, _ = self.correct(guess, row, near)
-        if point is None:
-            raise SolveError("the curve between two neighbouring points could not be resolved", status=Status.NOT_CONVERGED)
-        return point
 
     @abstractmethod
     def hold(self, quantity: str, value: float, near: Point) -> Point | None:
         """The point at which a quantity has a value exactly, corrected from one near by; None where that is singular."""
+
+    @abstractmethod
+    def determinant_sign(self, point: Point) -> int:
+        """Sign of the determinant of the arc-length system, up to one factor: another curve crosses where it changes, and no fold does."""
 
     def forbids(self, before: Point, after: Point) -> bool:
         """Whether no curve leads from one point to the other, though a step did."""

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from ..errors import SolveError, Status
 from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
-from .branch import FOLDS, BranchProblem
+from .branch import AT_CROSSING, FOLDS, BranchProblem
 from .continuation import BranchPoint, CurveProblem
 from .controls import CONTROLS, Control
 from .newton import TOLERANCE, relative_residual, relative_size
@@ -103,7 +103,7 @@ class Equations:
         return Borders(deflation, deflation, 0.0)
 
 
-#: the last equation of a point: from (equations, z) to its value there and its row
+#: the last equation of a point: its value and its derivatives with respect to (x, P, m)
 _Closing = Callable[[Equations], tuple[float, Array]]
 
 
@@ -161,8 +161,18 @@ class NumberProblem(CurveProblem[NumberPoint]):
         row[-1] = 1.0
         return row
 
+    def resolve(self, guess: Array, row: Array, near: NumberPoint) -> NumberPoint:
+        for tolerance in (TOLERANCE, AT_CROSSING):
+            point = self._in_plane(guess, row, near, tolerance)[0]
+            if point is not None:
+                return point
+        raise SolveError("the curve between two neighbouring points could not be resolved", status=Status.NOT_CONVERGED)
+
     def correct(self, guess: Array, row: Array, near: NumberPoint) -> tuple[NumberPoint | None, int]:
-        point, iterations = self._newton(guess, near.borders, lambda equations: (float(row @ (equations.z - guess)), row), near.dual)
+        return self._in_plane(guess, row, near, TOLERANCE)
+
+    def _in_plane(self, guess: Array, row: Array, near: NumberPoint, tolerance: float) -> tuple[NumberPoint | None, int]:
+        point, iterations = self._newton(guess, near.borders, _hyperplane(row, guess), near.dual, tolerance)
         if point is not None and not row[:-1].any():
             point.z[-1] = guess[-1]
         return point, iterations
@@ -175,12 +185,18 @@ class NumberProblem(CurveProblem[NumberPoint]):
         control = CONTROLS[quantity].at(value)
         return self._newton(near.z, near.borders, lambda equations: _controlled(equations, control), near.dual)[0]
 
+    def determinant_sign(self, point: NumberPoint) -> int:
+        """Of the derivatives of R, g and the arc length: det [K, b; b^T, 0] = -(b . K^-1 b) det K, and the dense part of the border."""
+        equations = self.at(point.z, point.borders)
+        equations.factorise()
+        deflated = equations.factor.determinant_sign() * (1 if equations.null_gap > 0 else -1)  # the gap is -1/(b . K^-1 b)
+        return deflated * equations.jacobian(point.dual).determinant_sign()
+
     def first(self, x: Array, pressure: float, number: float, direction: int) -> NumberPoint | None:
         """The point next to a guess at the same value of the number, oriented towards larger ones for direction +1."""
         guess = np.concatenate([x, [pressure, number]])
         row = self.number_row
-        closing: _Closing = lambda equations: (float(row @ (equations.z - guess)), row)  # noqa: E731
-        return self._newton(guess, self.first_borders(guess), closing, direction * row)[0]
+        return self._newton(guess, self.first_borders(guess), _hyperplane(row, guess), direction * row)[0]
 
     def first_borders(self, z: Array, sweeps: int = 6) -> Borders:
         """The mode of K closest to zero, by inverse iteration from the shape of the volume gradient."""
@@ -205,7 +221,9 @@ class NumberProblem(CurveProblem[NumberPoint]):
     def at(self, z: Array, borders: Borders) -> Equations:
         """The equations at one (x, P, m)."""
 
-    def _newton(self, z: Array, borders: Borders, closing: _Closing, orientation: Array) -> tuple[NumberPoint | None, int]:
+    def _newton(
+        self, z: Array, borders: Borders, closing: _Closing, orientation: Array, tolerance: float = TOLERANCE
+    ) -> tuple[NumberPoint | None, int]:
         """Newton's method for R, g and a last equation; None when it does not converge.
 
         The tangent is that of the curve, oriented so that the row ``orientation`` is positive on it.
@@ -227,9 +245,9 @@ class NumberProblem(CurveProblem[NumberPoint]):
                 abs(rest[0]) / (self.family.space.units["pressure"] + abs(z[-2])),
                 abs(rest[1]) / max(self.scale, abs(z[-1])),
             )
-            if size <= TOLERANCE:
+            if size <= tolerance:
                 return self._point(equations, jacobian, iteration, float(size), orientation), iteration
-            if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * TOLERANCE):
+            if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * tolerance):
                 return None, iteration
             previous = size
             z = z + np.concatenate([dx, rest])
@@ -245,6 +263,11 @@ class NumberProblem(CurveProblem[NumberPoint]):
         if orientation @ tangent < 0:
             tangent = -tangent
         return NumberPoint(state, equations.z, tangent, self.dual(tangent), 0.0, equations.renewed())
+
+
+def _hyperplane(row: Array, guess: Array) -> _Closing:
+    """row . (z - guess) = 0."""
+    return lambda equations: (float(row @ (equations.z - guess)), row)
 
 
 def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..errors import SolveError
-from .branch import unit_point
-from .continuation import BranchPoint
+from .continuation import BranchPoint, Point
 from .segment import Located, Segment
 from .wellposed import ill_posed
 
@@ -42,23 +43,18 @@ def branch_points(segment: Segment[BranchPoint], depth: int = 12) -> list[Locate
     return [point for half in halves for point in branch_points(half, depth - 1)]
 
 
-def branch_point(segment: Segment[BranchPoint]) -> Located[BranchPoint] | None:
+def branch_point(segment: Segment[Point]) -> Located[Point] | None:
     """The point where another branch crosses: the bordered matrix of the arc-length system is singular, though no quantity turns.
 
     Bisection on the sign of its determinant, which a fold does not change; None when that sign does not change either.
     """
-    if _bordered_sign(segment.a) * _bordered_sign(segment.b) > 0:
+    problem, sign = segment.problem, segment.problem.determinant_sign
+    if sign(segment.a) * sign(segment.b) > 0:
         return None
-    low, high = segment.narrowed(_bordered_sign, 0.0, 1.0)
+    low, high = segment.narrowed(sign, 0.0, 1.0)
     point, a, b = segment.at(low), segment.a, segment.b
     # at the crossing itself the equations have two tangents; that of this branch is known from its points on both sides
     tangent = (1 - low) * a.tangent + low * b.tangent
-    point = unit_point(segment.problem.potential, point.state, point.sigma, tangent)
+    tangent = tangent / problem.norm(tangent)
+    point = replace(point, tangent=tangent, dual=problem.dual(tangent))
     return Located("branch_point", point, (high - low) * segment.length + segment.spread(low, high))
-
-
-def _bordered_sign(point: BranchPoint) -> int:
-    """Sign of det [K, -V'; tangent^T, tangent_P] = det K (tangent_P + tangent^T K^-1 V')."""
-    evaluation = point.state.evaluation
-    solved = point.state.factor.solve(evaluation.volume_gradient)
-    return point.state.factor.determinant_sign() * (1 if point.dual[-1] + point.dual[:-1] @ solved > 0 else -1)

@@ -505,7 +505,9 @@ def _in_gas(scene: Scene, gas: Gas, start: Equilibrium | None) -> Equilibrium:
     if rests_flat(potential) and gas.pressure(potential.space.reference_volume) == 0:
         return record(scene, potential, flat_state(potential), clock=clock, gas=gas)
     if start is None:
-        return record(scene, potential, start_in_gas(potential, gas), clock=clock, gas=gas)
+        state = start_in_gas(potential, gas)
+        refuse_unresolved(potential, state)
+        return record(scene, potential, state, clock=clock, gas=gas)
     state = resume(potential, start)
     # the amount that holds the state at hand is known: march from it to the wanted one
     held = state.value_of(gas)

@@ -15,6 +15,8 @@ from scipy.optimize import brentq
 
 import femmembrane as fm
 
+from .population import recorded
+
 SOLVERS = ("ipopt", "newton")
 NEO_HOOKEAN = fm.NeoHookean()
 
@@ -339,3 +341,26 @@ def test_two_pipes_of_one_radius_push_it_nowhere() -> None:
     """An open tube between two pipes keeps its length where it is not stretched along it: the forces of both lids cancel."""
     scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(2.0, 12, top="axial", bottom="axial"))
     assert fm.equilibrium(scene, volume=2.6 * math.pi, solver="newton").pressure > 0
+
+
+# --- a state beyond rest, and one without a component ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("seed", [238, 415])
+def test_a_membrane_that_loads_stretch_holds_less_than_at_rest(seed: int, solver: str) -> None:
+    """Without its loads it would be compressed there, so that the branch from the inflated side leads to it."""
+    member = recorded()[seed]
+    eq = fm.equilibrium(member.scene, volume=member.volume, solver=solver)
+    assert eq.status is fm.Status.CONVERGED
+    assert eq.pressure == pytest.approx(member.pressure, rel=1e-6)
+
+
+@pytest.mark.parametrize("stretch", [1.3, 1.5, 2.0])
+def test_gas_in_a_tube_that_widens_alone(stretch: float) -> None:
+    """Its axial displacement is zero but for round-off, which is no reason for shorter steps. W with l1 = 1: P = 1 - l^-4."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(0.5, 10, top="radial", bottom="mirror"), degree=3)
+    volume, pressure = 0.5 * math.pi * stretch**2, 1 - stretch**-4
+    gas = fm.Gas(amount=(pressure + 2.0) * (volume + 0.25), chamber=0.25, atmosphere=2.0)
+    eq = fm.equilibrium(scene, gas=gas)
+    assert (eq.volume, eq.pressure) == pytest.approx((volume, pressure), rel=1e-9)

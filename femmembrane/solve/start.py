@@ -165,8 +165,12 @@ def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, 
     if volume != rest or not potential.flat:
         yield "sources and loads turned on there", lambda: _with_fields(potential, volume)
     if not near and not potential.space.loose:
-        first = rest + float(np.copysign(size, volume - rest))
-        yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume)
+        # less than at rest a bare membrane holds compressed, and one that loads stretch need not: it is met from the other side
+        for first in (rest + side * size for side in _sides(volume - rest)):
+            yield (
+                f"the branch from V = {first:.6g}",
+                lambda first=first: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume),  # type: ignore[misc]
+            )
     yield f"{_GUESS} there", lambda: _held(potential, VolumeControl(volume), volume, 0.0)
 
 

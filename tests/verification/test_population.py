@@ -118,7 +118,6 @@ def test_seeds_that_are_not_recorded_are_an_error(capsys):
 
 
 def test_no_member_is_pushed_out_of_a_pipe():
-    """A state that a fictitious support along the axis holds is none: forces on the pinned node would be left over."""
-    for member in MEMBERS:
-        if "axial" in member.draft.tables["mesh"].values():
-            check_scene(member.scene)
+    """A state that a fictitious support along the axis holds is none: a force on the pinned node would be left over."""
+    for seed in (29, 59, 875):  # a cap and tubes, drawn with an axial end that nothing would hold
+        check_scene(recorded()[seed].scene)

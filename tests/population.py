@@ -411,7 +411,8 @@ def judge(member: Member, control: str, load: Any, solver: str, eq: fm.Equilibri
     }[control]
     # next to a fold of what is held the state of the finer mesh may lie beyond it: it is there all the same, at another volume or pressure
     ways = (equation, finer.at_volume(eq.volume), finer.at_pressure(eq.pressure))
-    change = min((_moved(finer, there, eq, walker.rest) for way in ways if (there := walker.moved_to(spot, finer, way))), default=None)
+    found_there = (there for way in ways if (there := walker.moved_to(spot, finer, way)))
+    change = min((_moved(finer, there, eq, walker.rest, control) for there in found_there), default=None)
     if change is None:
         return "wrong: unresolved", f"not there on a finer mesh ({found})", True
     if change > UNRESOLVED:
@@ -419,13 +420,13 @@ def judge(member: Member, control: str, load: Any, solver: str, eq: fm.Equilibri
     return "answered", found, True
 
 
-def _moved(finer: Walker, there: Spot, eq: fm.Equilibrium, rest: float) -> float:
-    """Largest relative change of pressure, volume and height of the pole on a finer mesh."""
+def _moved(finer: Walker, there: Spot, eq: fm.Equilibrium, rest: float, control: str) -> float:
+    """Largest relative change of pressure and volume on a finer mesh, and of the height of the pole where that is what was held."""
     size = finer.size
     pressure = abs(there.pressure - eq.pressure) / (abs(eq.pressure) + 1e-6 / size)
     volume = abs(there.volume - eq.volume) / (abs(eq.volume - rest) + 1e-6 * size**3)
     height = abs(finer.space.center_height(there.x) - eq.center_height) / (abs(eq.center_height) + size)
-    return max(pressure, volume, height)
+    return max(pressure, volume, height if control == "center_height" else 0.0)
 
 
 # --- record and report --------------------------------------------------------------------------------------------------------------

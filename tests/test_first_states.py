@@ -364,3 +364,10 @@ def test_gas_in_a_tube_that_widens_alone(stretch: float) -> None:
     gas = fm.Gas(amount=(pressure + 2.0) * (volume + 0.25), chamber=0.25, atmosphere=2.0)
     eq = fm.equilibrium(scene, gas=gas)
     assert (eq.volume, eq.pressure) == pytest.approx((volume, pressure), rel=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_absurd_trial_is_refused_in_silence() -> None:
+    """Turning on the sources of this scene a step overshoots beyond what is a number; the step is halved, and no warning says so."""
+    member = recorded()[363]
+    assert fm.equilibrium(member.scene, center_height=member.center_height).status is fm.Status.CONVERGED

@@ -130,7 +130,8 @@ class Equations:
         bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial step may be absurd: it is refused by what it gives
+            self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
         self.finite = evaluation.finite and math.isfinite(pressure)

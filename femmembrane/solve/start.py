@@ -7,9 +7,9 @@ One way for every shape, support, material, source, load and control. Its parts 
 2. *Sources and loads turned on* there, at constant volume, along the path even where it turns back.
 3. *The branch through that state* to the load that is asked for, by arc length in both directions.
 
-The order of loading is fixed, so that the answer is one state and not an accident of the optimiser. Where a part does not arrive, the next
-starting volume is tried, from near the load outwards, then the mirror side, then the guess with all sources and loads at once. An error
-says what was tried; that there is no equilibrium it never claims.
+The order of loading is fixed, so that the answer is one state and not an accident of the optimiser. Where a part does not arrive, or at a
+state that is compressed or that only its mesh has, the next starting volume is tried, from near the load outwards, then the mirror side,
+then the guess with all sources and loads at once. An error says what was tried; that there is no equilibrium it never claims.
 """
 
 from __future__ import annotations

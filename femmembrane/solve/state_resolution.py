@@ -5,7 +5,7 @@ layer at the rim. Such a state is told by what happens to it on finer meshes. Th
 at a pole it is level; the kinks that a mesh leaves there are errors of its slopes. They are small on ordinary meshes, and looking at them
 costs next to nothing. Where one is large the state is looked for on meshes that are finer and finer. One that is an approximation of
 something loses its kinks there, or at least keeps its stretches (the tip below a dipole takes many halvings to become round). A needle is
-not found again, or grows.
+not found again, or grows. A stress that a mesh leaves at an edge which is free to move in its plane is an error of the same kind.
 """
 
 from __future__ import annotations

@@ -61,10 +61,10 @@ _ADVICE = {
     Status.CLOSED: "the branch came back to the branch point where it set out: going on would trace it once more",
     Status.NOT_RESOLVED: "the mesh makes this state: make elements smaller where it says (towards a pole with mesh.ratio or mesh.radii), "
     "take more of them or a higher degree; a state that finer meshes lose does not exist",
-    Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: the plain energy is ill-posed here and its states depend on the mesh; "
-    "a tension field (effects.tension_field = true) wrinkles instead",
-    Status.SLACK: "the tension field ends here: where no tension is left along the meridian the membrane folds onto itself; "
-    "a finer mesh comes closer to the fold, not past it",
+    Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: where it is compressed the plain energy is ill-posed and its states "
+    "depend on the mesh; a tension field (effects.tension_field = true) wrinkles instead",
+    Status.SLACK: "where no tension is left along the meridian the membrane folds onto itself, and its tension field ends; "
+    "a finer mesh comes closer to such a fold, not past it",
 }
 
 

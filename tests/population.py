@@ -36,6 +36,8 @@ from tests.walker import Spot, Walker
 RECORD = Path(__file__).parent / "data" / "population.json"
 #: part by which pressure or volume of a resolved state may change on a finer mesh
 RESOLVED = 1e-3
+#: and the logarithm of the largest stretch by so much
+STEADY = 0.2
 #: an answer that moves by more than this on a finer mesh does not count
 UNRESOLVED = 3e-2
 #: largest pressure times size of a state that is asked for, and largest volume over the cube of the size
@@ -264,8 +266,17 @@ def _resolved(walker: Walker, finer: Walker, spot: Spot) -> bool:
             change = abs(other.pressure - spot.pressure) / max(abs(spot.pressure), 1e-9 / walker.size)
             size = abs(other.volume - spot.volume) / max(abs(spot.volume - walker.rest), 1e-12 * walker.size**3)
             small = abs(spot.pressure) * walker.size < 1e-3 and abs(other.pressure - spot.pressure) * walker.size < 1e-5
-            return (change < RESOLVED or small) and size < RESOLVED and finer.taut(other)
+            steady = abs(_largest_stretch(finer, other) - _largest_stretch(walker, spot)) < STEADY
+            return (change < RESOLVED or small) and size < RESOLVED and steady and finer.taut(other)
     return False
+
+
+def _largest_stretch(walker: Walker, spot: Spot) -> float:
+    """Logarithm of the largest stretch: of a needle or a layer that the mesh makes it grows where elements are halved."""
+    space = walker.space
+    u, u_x, _, w_x = space.at_quadrature(spot.x).reshape(4, *space.R.shape)
+    along = np.hypot(space.R_x + u_x, space.Z_x + w_x) / np.hypot(space.R_x, space.Z_x)
+    return float(np.log(max(along.max(), (1 + u / space.R).max())))
 
 
 def _member(plan: Draft, walker: Walker, spot: Spot, factor: float, walked: int) -> Member:
@@ -398,14 +409,24 @@ def judge(member: Member, control: str, load: Any, solver: str, eq: fm.Equilibri
         "center_height": finer.at_height(eq.center_height),
         "gas": finer.at_gas(load.amount, load.chamber, load.atmosphere) if control == "gas" else None,
     }[control]
-    there = walker.moved_to(spot, finer, equation)
-    if there is None:
+    # next to a fold of what is held the state of the finer mesh may lie beyond it: it is there all the same, at another volume or pressure
+    ways = (equation, finer.at_volume(eq.volume), finer.at_pressure(eq.pressure))
+    found_there = (there for way in ways if (there := walker.moved_to(spot, finer, way)))
+    change = min((_moved(finer, there, eq, walker.rest, control) for there in found_there), default=None)
+    if change is None:
         return "wrong: unresolved", f"not there on a finer mesh ({found})", True
-    change = abs(there.pressure - eq.pressure) / (abs(eq.pressure) + 1e-6 / size)
-    change = max(change, abs(there.volume - eq.volume) / (abs(eq.volume - walker.rest) + 1e-6 * size**3))
     if change > UNRESOLVED:
         return "wrong: unresolved", f"moves by {change:.1e} on a finer mesh ({found})", True
     return "answered", found, True
+
+
+def _moved(finer: Walker, there: Spot, eq: fm.Equilibrium, rest: float, control: str) -> float:
+    """Largest relative change of pressure and volume on a finer mesh, and of the height of the pole where that is what was held."""
+    size = finer.size
+    pressure = abs(there.pressure - eq.pressure) / (abs(eq.pressure) + 1e-6 / size)
+    volume = abs(there.volume - eq.volume) / (abs(eq.volume - rest) + 1e-6 * size**3)
+    height = abs(finer.space.center_height(there.x) - eq.center_height) / (abs(eq.center_height) + size)
+    return max(pressure, volume, height if control == "center_height" else 0.0)
 
 
 # --- record and report --------------------------------------------------------------------------------------------------------------
@@ -489,7 +510,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _record_all(asked.first, asked.count, asked.out)
         return 0
     report = Report()
-    for one in [recorded()[seed] for seed in range(asked.first, asked.first + asked.count) if seed in recorded()]:
+    members = [recorded()[seed] for seed in range(asked.first, asked.first + asked.count) if seed in recorded()]
+    if not members:
+        last = asked.first + asked.count - 1
+        parser.error(f"no seed from {asked.first} to {last} is recorded in {RECORD.name}, whose largest is {max(recorded(), default=None)}")
+    for one in members:
         answers = ask(one)
         report.answers += answers
         for a in answers:

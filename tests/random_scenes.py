@@ -168,7 +168,7 @@ def _annulus(dice: Dice) -> tuple[dict[str, Any], float]:
 
 def _cap(dice: Dice) -> tuple[dict[str, Any], float]:
     height = dice.one_of([0.0, dice.log(0.01, 3), dice.log(0.1, 2), dice.log(0.1, 2)])
-    rim = dice.one_of(["clamped", "clamped", "radial", "mirror", "axial", "hub"])
+    rim = dice.one_of(["clamped", "clamped", "radial", "mirror", "clamped", "hub"])  # nothing would hold it in a pipe
     return {"shape": "cap", "height": height * (-1 if dice.chance(0.3) else 1), **_elements(dice, 12, 48), "rim": rim}, 1.0
 
 
@@ -186,8 +186,9 @@ def _tube(dice: Dice) -> tuple[dict[str, Any], float]:
     length = dice.log(0.3, 30)
     words = ["clamped", "clamped", "hub", "hub", "mirror", "radial", "axial", "free"]
     top, bottom = dice.one_of(words), dice.one_of(words)
-    if top == bottom == "axial":  # two walls and nothing that holds the tube along the axis: a tube of its first length
-        bottom = "clamped"
+    ends = {top, bottom}
+    if "axial" in ends and not ends & {"clamped", "mirror", "radial"}:  # nothing holds it in its pipe; in two pipes it keeps its length
+        top, bottom = ("clamped", bottom) if top == "axial" != bottom else (top, "clamped")
     size = _elements(dice, 12, 40)
     size["elements"] = max(size["elements"], int(2 * length))
     return {"shape": "cylinder", "length": length, **size, "top": top, "bottom": bottom}, 1.0

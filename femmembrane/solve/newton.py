@@ -216,7 +216,8 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     potential, length = equations.potential, 1.0
     # both corrections in the units of the first, which may be larger than the displacement itself
     units = [max(pair) for pair in zip(potential.largest(equations.x), potential.largest(dx), strict=True)]
-    units = [max(unit, NEGLIGIBLE * max(units)) for unit in units]
+    # a component that is zero but for round-off, as along a tube that widens alone, has no size of its own
+    units = [unit if unit > NEGLIGIBLE * max(units) else max(units) for unit in units]
     while length > 1e-4:
         x, pressure = equations.x + length * dx, equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)

@@ -7,9 +7,9 @@ One way for every shape, support, material, source, load and control. Its parts 
 2. *Sources and loads turned on* there, at constant volume, along the path even where it turns back.
 3. *The branch through that state* to the load that is asked for, by arc length in both directions.
 
-The order of loading is fixed, so that the answer is one state and not an accident of the optimiser. Where a part does not arrive, the next
-starting volume is tried, from near the load outwards, then the mirror side, then the guess with all sources and loads at once. An error
-says what was tried; that there is no equilibrium it never claims.
+The order of loading is fixed, so that the answer is one state and not an accident of the optimiser. Where a part does not arrive, or at a
+state that is compressed or that only its mesh has, the next starting volume is tried, from near the load outwards, then the mirror side,
+then the guess with all sources and loads at once. An error says what was tried; that there is no equilibrium it never claims.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
 from .newton import NEGLIGIBLE, correct
 from .segment import Segment
-from .state import Predictor, State, at_rest, flat_state
+from .state import Predictor, State, at_rest, distance, flat_state
+from .state_resolution import unresolved
 from .stepping import march
 from .wellposed import ill_posed, is_slack, slackness, unresolved_source
 
@@ -47,6 +48,8 @@ NEAR = 0.2
 SAFE = 20.0
 #: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
 HUGE = 1e12
+#: different states that the mesh does not resolve, after which no further way is tried; and how near they are if they are the same
+_COARSE, _SAME = 2, 1e-6
 #: most steps along a branch in each direction, and corrections of a guess
 _STEPS, _CORRECTIONS = 300, 40
 
@@ -101,13 +104,16 @@ _GUESS = "a guess"
 
 
 def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
-    """The state of the first way that arrives; else an error with what each of them said, that of the best reason first."""
+    """The state of the first way that arrives at a sound one; else the first that is none, of which it is then said what is wrong with it;
+    else an error with what each way said, that of the best reason first."""
     failures: list[SolveError] = []
     tried: list[str] = []
-    spare = None
+    spare, lost = None, list[State]()
     for name, way in ways:
-        if name.startswith(_GUESS) and (spare or any(f.status.ill_posed for f in failures)):
+        if name.startswith(_GUESS) and any(f.status.ill_posed for f in failures):
             break  # the branch ends there; a guess would land beyond its end, on what the mesh makes of it
+        if len(lost) == _COARSE:
+            break  # all that is there is finer than this mesh
         tried.append(name)
         try:
             state = way()
@@ -117,9 +123,12 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
         if state is not None and _adrift(state):
             failures.append(SolveError("it drifts off to where sources and loads no longer hold it", status=Status.NO_EQUILIBRIUM))
             continue
-        if state is not None and _well_posed(state):
+        if state is None or any(_same(state, other) for other in lost):
+            continue
+        if _sound(state):
             return state
         spare = spare or state
+        lost += [state] * _well_posed(state)
     if spare is not None:
         return spare
     order = [Status.SLACK, Status.LEGENDRE_FAILURE, Status.DIPOLE_CONTACT]
@@ -158,8 +167,12 @@ def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, 
     if volume != rest or not potential.flat:
         yield "sources and loads turned on there", lambda: _with_fields(potential, volume)
     if not near and not potential.space.loose:
-        first = rest + float(np.copysign(size, volume - rest))
-        yield f"the branch from V = {first:.6g}", lambda: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume)
+        # less than at rest a bare membrane holds compressed, and one that loads stretch need not: it is met from the other side
+        for first in (rest + side * size for side in _sides(volume - rest)):
+            yield (
+                f"the branch from V = {first:.6g}",
+                lambda first=first: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume),  # type: ignore[misc]
+            )
     yield f"{_GUESS} there", lambda: _from_guess(potential, VolumeControl(volume), volume)
 
 
@@ -216,7 +229,7 @@ def _inflated(potential: Potential, volume: float) -> State:
     for share in _shares(potential, abs(volume - rest)):
         first = rest + share * (volume - rest)
         state = _from_guess(potential, VolumeControl(first), first, magnetic=0.0)
-        if state is not None and not _well_posed(state):
+        if state is not None and not (_sound if first == volume else _well_posed)(state):
             spare, state = (spare or state) if first == volume else spare, None
         if state is None:
             continue
@@ -327,12 +340,21 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
         if not potential.surrounded or 0 < nearly <= NEARLY_FLAT:
             size = min(size, nearly * units["volume"])
     held, sides = CONTROLS["pressure"], _sides(load)
+    spare = None
     try:
-        return _first_of(_ways_from(potential, held, pressure, size, sides, _is_minimum), f"P = {pressure:.9g} that is stable")
+        spare = _first_of(_ways_from(potential, held, pressure, size, sides, _is_minimum), f"P = {pressure:.9g} that is stable")
+        if stable or _sound(spare):
+            return spare
     except SolveError:
         if stable:
             raise
-    return _first_of(_ways_from(potential, held, pressure, size, sides), f"P = {pressure:.9g}")
+    try:
+        found = _first_of(_ways_from(potential, held, pressure, size, sides), f"P = {pressure:.9g}")
+    except SolveError:
+        if spare is None:
+            raise
+        return spare
+    return spare if spare is not None and not _sound(found) else found
 
 
 def start_at_height(potential: Potential, height: float) -> State:
@@ -458,6 +480,16 @@ def _gas_met(segment: Segment[BranchPoint], gas: Gas) -> Iterator[State]:
 
 def _well_posed(state: State) -> bool:
     return ill_posed(state.evaluation.potential, state.evaluation) is None
+
+
+def _same(a: State, b: State) -> bool:
+    potential = a.evaluation.potential
+    return a.x.shape == b.x.shape and distance(potential, a.x, b.x) <= _SAME * distance(potential, a.x, np.zeros_like(a.x))
+
+
+def _sound(state: State) -> bool:
+    """Whether a state is that of a membrane: well-posed, and not one of its mesh only."""
+    return _well_posed(state) and not unresolved(state.evaluation.potential, state)
 
 
 def _is_minimum(state: State) -> bool:

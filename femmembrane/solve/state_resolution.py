@@ -5,7 +5,7 @@ layer at the rim. Such a state is told by what happens to it on finer meshes. Th
 at a pole it is level; the kinks that a mesh leaves there are errors of its slopes. They are small on ordinary meshes, and looking at them
 costs next to nothing. Where one is large the state is looked for on meshes that are finer and finer. One that is an approximation of
 something loses its kinks there, or at least keeps its stretches (the tip below a dipole takes many halvings to become round). A needle is
-not found again, or grows.
+not found again, or grows. A stress that a mesh leaves at an edge which is free to move in its plane is an error of the same kind.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from contextlib import suppress
 import numpy as np
 
 from ..errors import SolveError, Status
+from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from .banded import negative_directions
@@ -38,6 +39,8 @@ _WEAK = 0.1
 _NEAR, _CLOSE = 1.0, 0.05
 #: relative change of the pressure in a finer space that a layer of compression may make which is the mesh's alone
 _LAYER = 0.02
+#: radial stress at an edge that is free to move in its plane, relative to the largest stress, that is looked into
+_PULL = 0.2
 #: logarithm of stretches that leave no digits to the finest meshes
 _NO_DIGITS = np.log(1e5)
 #: most halvings, and elements beyond which none is halved
@@ -56,6 +59,8 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
     scene = potential.scene if scene is None else scene
     space = potential.space
     if reason := _compressed_on_this_mesh(potential, state):
+        return reason
+    if reason := _pulled_at_an_edge(potential, state, scene):
         return reason
     kinks = space.kinks(state.x)
     worst = float(kinks.max(initial=0.0))
@@ -87,6 +92,38 @@ def _compressed_on_this_mesh(potential: Potential, state: State) -> str:
         f"the mesh does not resolve the membrane at {bad.where}, where its stress is compressive on this mesh alone: P is "
         f"{found.pressure:.6g} on {on.n_elements} elements of degree {on.degree}"
     )
+
+
+def _pulled_at_an_edge(potential: Potential, state: State, scene: Scene) -> str:
+    """Why a state is not resolved whose edge is pulled where nothing pulls, and that a finer mesh does not find; empty for others."""
+    left = _pull_at_edges(potential, state)
+    if not left or max(left.values()) <= _PULL:
+        return ""
+    coarse = potential if scene is potential.scene else potential_of(scene)
+    finer = scene.replace(mesh=scene.mesh.refined())
+    degrees = [scene.degree] if scene.degree == MAX_DEGREE else [scene.degree + 1, scene.degree]
+    if any(_found_again(potential_of(finer.replace(degree=degree)), coarse, state) is not None for degree in degrees):
+        return ""
+    radius, share = max(left.items(), key=lambda item: item[1])
+    return (
+        f"the mesh does not resolve the membrane at r = {radius:.3g}, where it leaves {share:.0%} of the largest stress at an edge that "
+        f"nothing pulls: no such state was found on {finer.mesh.elements} elements"
+    )
+
+
+def _pull_at_edges(potential: Potential, state: State) -> dict[float, float]:
+    """Radial part of the meridional stress at ends that nothing holds in their plane, over the largest stress: zero for a membrane."""
+    space, left = potential.space, {}
+    for k, support in enumerate(space.supports):
+        if space.on_axis[k] or "u" in support.held or potential.sources:
+            continue
+        end = space.ends[[-k]]
+        (R, _), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
+        u, u_s, _, w_s = space.evaluate(state.x, end)
+        stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+        level = float((np.abs(R_s + u_s) / np.hypot(R_s + u_s, Z_s + w_s))[0])
+        left[float(R[0])] = abs(float(stress[0])) * level / float(np.abs(state.evaluation.stress).max() or 1.0)
+    return left
 
 
 def refuse_unresolved(potential: Potential, state: State, scene: Scene | None = None) -> None:

@@ -6,6 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 from ..checks import choice, is_whole, whole
+from ..discretization.space import anchored
+from ..discretization.supports import as_support, floats
 from ..errors import InputError
 from ..potential import Potential
 from ..scene import MAX_STEPS, Scene
@@ -17,6 +19,27 @@ def check_scene(scene: Any) -> None:
     """Raise InputError unless the argument is a scene; the path of a scene file is none."""
     if not isinstance(scene, Scene):
         raise InputError("scene", scene, "a Scene is allowed; Scene.from_toml reads one from a file")
+    _check_walls(scene)
+
+
+def _check_walls(scene: Scene) -> None:
+    """Raise InputError for a membrane that slides along a wall where nothing holds it against the pressure.
+
+    Moved as a whole along the axis it changes its volume by the area across the wall, so that any pressure pushes it out of its pipe. Two
+    walls of one radius are pushed in opposite directions.
+    """
+    supports = [as_support(held) for held in scene.mesh.supports()]
+    if not any(end.wall for end in supports) or not floats(supports) or "along" in anchored(scene):
+        return
+    radii = scene.mesh.position(scene.mesh.breakpoints()[[0, -1]])[0]
+    walls = [float(R) ** 2 if end.wall else 0.0 for R, end in zip(radii, supports, strict=True)]
+    if abs(walls[1] - walls[0]) > 1e-9 * max(walls):
+        raise InputError(
+            "mesh",
+            "an axial end",
+            "nothing holds the membrane along the axis, and any pressure pushes it out of the pipe in which that end slides; the other end "
+            "may be clamped, radial or mirror, or this one a hub, on which the pressure acts too",
+        )
 
 
 def check_max_steps(max_steps: Any) -> None:

@@ -15,6 +15,8 @@ from scipy.optimize import brentq
 
 import femmembrane as fm
 
+from .population import recorded
+
 SOLVERS = ("ipopt", "newton")
 NEO_HOOKEAN = fm.NeoHookean()
 
@@ -290,3 +292,96 @@ def test_a_cap_whose_pole_is_in_the_plane_of_its_rim_is_not_at_rest() -> None:
     assert found.center_height == pytest.approx(0.0, abs=1e-12)
     assert found.pressure == pytest.approx((beside[0].pressure + beside[1].pressure) / 2, rel=1e-2)
     assert found.volume == pytest.approx((beside[0].volume + beside[1].volume) / 2, rel=1e-2)
+
+
+# --- a state of the mesh that comes first ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_heavy_annulus_that_its_pressure_just_carries(solver: str) -> None:
+    """Met first is a state with V = -0.0044 on this mesh, whose inner edge is pulled though it is free; on finer ones it is lost."""
+    material = fm.Ogden(mu=(1.4911242603550297, 0.002840236686390533, -0.02366863905325444), alpha=(1.3, 5.0, -2.0))
+    mesh = fm.annulus(0.36915, 8, inner="radial", outer="clamped")
+    scene = fm.Scene(material=material, mesh=mesh, degree=4, loads=[fm.Weight(0.0218251)])
+    eq = fm.equilibrium(scene, pressure=0.021825152028942637, solver=solver)
+    assert eq.volume == pytest.approx(0.00150764685, rel=1e-6)
+    # of what pressure carries more than the weight, a part of 2e-6, the mesh of twice as many elements asks for 2% less
+    finer = fm.equilibrium(scene.replace(mesh=mesh.refined()), volume=eq.volume, solver="newton")
+    assert finer.pressure - 0.0218251 == pytest.approx(eq.pressure - 0.0218251, rel=0.03)
+
+
+def test_a_needle_gives_way_to_the_state_behind_it() -> None:
+    """At this volume Newton's method meets a needle at the pole with P = -0.207; pushed in by the pole height there is the state."""
+    scene = fm.Scene(material=fm.Varga(), mesh=fm.disc(14, ratio=0.342657), degree=4, loads=[fm.Weight(0.0117095)])
+    eq = fm.equilibrium(scene, volume=-2.329, solver="newton")
+    assert eq.pressure == pytest.approx(-1.756474, rel=1e-5)
+    fine = fm.equilibrium(scene.replace(mesh=fm.disc(56, ratio=0.342657)), volume=-2.329, start=None, solver="newton")
+    assert fine.pressure == pytest.approx(eq.pressure, rel=1e-2)
+
+
+def test_where_the_mesh_makes_one_state_another_is_looked_for() -> None:
+    """A tube whose hubs are pushed together: next to its rest the mesh compresses it alone; inflated it holds the pressure."""
+    forces = [fm.HubForce(-1.12907, hub="first"), fm.HubForce(1.12907, hub="last")]
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(6.87862, 32, top="hub", bottom="hub"), loads=forces)
+    eq = fm.equilibrium(scene, pressure=0.3856041247569605, solver="newton")
+    assert eq.status is fm.Status.CONVERGED
+    fine = fm.equilibrium(scene.replace(mesh=fm.cylinder(6.87862, 64, top="hub", bottom="hub")), volume=eq.volume, solver="newton")
+    assert fine.pressure == pytest.approx(eq.pressure, rel=5e-3)
+
+
+# --- what no support holds ---
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        fm.cap(0.5, 12, rim="axial"),
+        fm.cylinder(2.0, 12, top="axial", bottom="hub"),
+        fm.cylinder(2.0, 12, top="free", bottom="axial"),
+    ],
+    ids=["cap", "hub", "free"],
+)
+def test_what_its_pressure_pushes_out_of_a_pipe_is_refused(mesh: Any) -> None:
+    """Moved along the axis it changes its volume by pi times the shift: at no pressure but zero do the forces on it add up to none."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=mesh)
+    for how in ({"volume": 8.0}, {"pressure": 0.1}, {"gas": fm.Gas(amount=3.0, chamber=1.0)}):
+        with pytest.raises(fm.InputError, match="pushes it out of the pipe"):
+            fm.equilibrium(scene, **how)
+    with pytest.raises(fm.InputError, match="pushes it out of the pipe"):
+        fm.trace(scene, start=8.0)
+
+
+def test_two_pipes_of_one_radius_push_it_nowhere() -> None:
+    """An open tube between two pipes keeps its length where it is not stretched along it: the forces of both lids cancel."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(2.0, 12, top="axial", bottom="axial"))
+    assert fm.equilibrium(scene, volume=2.6 * math.pi, solver="newton").pressure > 0
+
+
+# --- a state beyond rest, and one without a component ---
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("seed", [238, 415])
+def test_a_membrane_that_loads_stretch_holds_less_than_at_rest(seed: int, solver: str) -> None:
+    """Without its loads it would be compressed there, so that the branch from the inflated side leads to it."""
+    member = recorded()[seed]
+    eq = fm.equilibrium(member.scene, volume=member.volume, solver=solver)
+    assert eq.status is fm.Status.CONVERGED
+    assert eq.pressure == pytest.approx(member.pressure, rel=1e-6)
+
+
+@pytest.mark.parametrize("stretch", [1.3, 1.5, 2.0])
+def test_gas_in_a_tube_that_widens_alone(stretch: float) -> None:
+    """Its axial displacement is zero but for round-off, which is no reason for shorter steps. W with l1 = 1: P = 1 - l^-4."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(0.5, 10, top="radial", bottom="mirror"), degree=3)
+    volume, pressure = 0.5 * math.pi * stretch**2, 1 - stretch**-4
+    gas = fm.Gas(amount=(pressure + 2.0) * (volume + 0.25), chamber=0.25, atmosphere=2.0)
+    eq = fm.equilibrium(scene, gas=gas)
+    assert (eq.volume, eq.pressure) == pytest.approx((volume, pressure), rel=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_absurd_trial_is_refused_in_silence() -> None:
+    """Turning on the sources of this scene a step overshoots beyond what is a number; the step is halved, and no warning says so."""
+    member = recorded()[363]
+    assert fm.equilibrium(member.scene, center_height=member.center_height).status is fm.Status.CONVERGED

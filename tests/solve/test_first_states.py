@@ -14,8 +14,7 @@ import pytest
 from scipy.optimize import brentq
 
 import femmembrane as fm
-
-from .population import recorded
+from tests.population import recorded
 
 SOLVERS = ("ipopt", "newton")
 NEO_HOOKEAN = fm.NeoHookean()

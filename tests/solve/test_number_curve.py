@@ -20,7 +20,7 @@ from femmembrane.solve.special_points import branch_point
 from femmembrane.solve.state import Predictor
 
 from tests.cases import OGDEN, disc_scene
-from tests.test_switching import sphere
+from tests.solve.test_switching import sphere
 
 SCENE = disc_scene(OGDEN, (200.0, 6.5), elements=16)
 STRENGTH = Parameter(SCENE, "source.0.strength")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -159,7 +159,6 @@ class Potential:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
         self.sources = acting_sources(scene.sources, scene.susceptibility)  # nothing is built of others
-        self._circles = tuple(circle for source in self.sources for circle in source.circles)
         self.loads = tuple(load for load in scene.loads if load.acts)
         if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
             advice = (
@@ -259,6 +258,10 @@ class Potential:
     @BUILDING
     def _load_kernel(self) -> Replay:
         return Replay(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
+
+    @cached_property
+    def _circles(self) -> tuple[Any, ...]:
+        return tuple(circle for source in self.sources for circle in source.circles)
 
     def distance_to_sources(self, x: Array) -> float:
         """Smallest distance of poles, hubs and quadrature points from a source; infinite without sources."""

@@ -69,8 +69,8 @@ def test_the_other_branch_is_traced_from_a_branch_point(direction: int) -> None:
     assert branch.status is fm.Status.CLOSED
     assert "came back to the branch point" in branch.message
     assert branch[0].volume == first.volume
-    assert branch[-1].volume == pytest.approx(first.volume, rel=1e-6)
-    assert [p.volume for p in branch_points(branch)] == pytest.approx([second.volume, first.volume], rel=1e-6)
+    assert branch[-1].volume == pytest.approx(first.volume, rel=1e-5)
+    assert [p.volume for p in branch_points(branch)] == pytest.approx([second.volume, first.volume], rel=2e-5)
     for point in branch_points(branch):
         assert abs(point.volume / (first.volume if abs(point.volume - first.volume) < 1 else second.volume) - 1) <= 2 * point.error + 1e-9
     # none of it but the ends is a sphere, whose pole lies at the stretch

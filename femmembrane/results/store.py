@@ -13,8 +13,7 @@ import os
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +24,9 @@ from .. import files
 from ..discretization.meridian import side
 from ..errors import InputError, Status
 from ..origin import package_version
-from .error_estimate import ESTIMATED, ErrorEstimate, from_numbers
-from .quantities import QUANTITIES, typed
-from .verdict import Verdict
+from .analyses import asked, quantity
+from .analyses.base import Variable
+from .quantities import typed
 
 if TYPE_CHECKING:
     import xarray
@@ -40,16 +39,11 @@ FORMAT = 1
 _INSIDE = ("inside", "where the membrane encloses a volume, below where it is flat")
 
 Array = NDArray[np.float64]
-#: a variable of a data set: dimensions and values
-_Variable = tuple[tuple[str, ...], Any]
 
 _SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "load_energy", "residual", "seconds")
 _SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
 #: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
 _SPECIAL, _LIMIT = "special_", "limit_"
-_STABLE = {"stable": True, "unstable": False, "marginal": None}
-#: in place of a number of negative directions that was not determined
-_UNCOUNTED = -1
 #: seconds after which another process is thought not to come back from a file
 _PATIENCE = 60.0
 #: bytes of values that one byte of a file may hold at most: what its compression reaches
@@ -65,12 +59,8 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
 
     width = branch[0].state.size if len(branch) else 0
     variables = {**_table_variables(branch), **_equilibrium_variables(list(branch), width, "step"), **_profile_variables(branch)}
-    for tag, control, azimuthal in _asked(branch.scene):
-        variables |= _verdict_variables(tag, [e.verdict(control, azimuthal=azimuthal) for e in branch])
-    if branch.scene.analysis.wrinkling:
-        variables |= _zone_variables(branch)
-    if branch.scene.analysis.error_estimates:
-        variables |= _estimate_variables(branch)
+    for analysis in asked(branch.scene):
+        variables |= analysis.variables(branch)
     if branch.special_points is not None:
         variables |= _special_variables(branch.special_points, width, _SPECIAL)
     if branch.jumps:
@@ -83,7 +73,7 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
         variables["trace_point"] = ("trace", "unknown"), branch.memory.points
         variables["trace_slope"] = ("trace", "unknown"), branch.memory.slopes
     described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
-    coordinates = {name: described.pop(name) for name in ("step", "r", "s", "estimated") if name in described}
+    coordinates = {name: described.pop(name) for name in [*described] if name in ("r", "s") or described[name][0] == (name,)}
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
 
 
@@ -152,7 +142,7 @@ def scene_from_text(text: str) -> Scene:
     return Scene.from_dict(tomllib.loads(text))
 
 
-def _table_variables(branch: Branch) -> dict[str, _Variable]:
+def _table_variables(branch: Branch) -> dict[str, Variable]:
     from .table import columns, rows
 
     names, table = columns(branch), list(rows(branch))
@@ -160,7 +150,7 @@ def _table_variables(branch: Branch) -> dict[str, _Variable]:
     return {name: (("step",), typed(name, column)) for name, column in zip(names, cells, strict=True)}
 
 
-def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, _Variable]:
+def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, Variable]:
     """What :func:`_equilibria` needs to build the records again; ``width`` is the length of their states."""
     absent = {
         name
@@ -176,7 +166,7 @@ def _equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimens
     }
 
 
-def _profile_variables(branch: Branch) -> dict[str, _Variable]:
+def _profile_variables(branch: Branch) -> dict[str, Variable]:
     profiles = [e.profile() for e in branch]
     if not profiles:
         return {}
@@ -185,67 +175,11 @@ def _profile_variables(branch: Branch) -> dict[str, _Variable]:
     return {**{key: (("node",), np.array(profiles[0][key])) for key in places}, **values}
 
 
-def _asked(scene: Scene) -> list[tuple[str, str | None, int]]:
-    """(name in columns, control, azimuthal) of the verdicts that a scene asks for."""
-    return [*((c, c, 0) for c in scene.analysis.stability), *((f"n{n}", None, n) for n in scene.analysis.azimuthal_modes)]
-
-
-def _verdict_variables(tag: str, verdicts: Sequence[Verdict]) -> dict[str, _Variable]:
-    """All of the verdicts of one class that the columns of the table leave out, and :func:`_verdicts` needs to build them again."""
-    counts = (_UNCOUNTED if v.negative_directions is None else v.negative_directions for v in verdicts)
-    variables: dict[str, _Variable] = {
-        f"verdict_{tag}": (("step",), typed("verdict_", (v.word for v in verdicts))),
-        f"lambda_error_{tag}": (("step",), typed("error", (v.error for v in verdicts))),
-        f"negative_directions_{tag}": (("step",), typed("negative_directions", counts)),
-        f"reason_{tag}": (("step",), typed("reason", (v.reason for v in verdicts))),
-    }
-    shapes = [_shape(v) for v in verdicts]
-    for key, known in next((s for s in shapes if s), {}).items():
-        dimension = f"coefficient_{tag}" if key == "coefficients" else "node"
-        variables[f"mode_{tag}_{key}"] = (("step", dimension), np.array([s.get(key, np.full_like(known, np.nan)) for s in shapes]))
-    return variables
-
-
-def _shape(verdict: Verdict) -> dict[str, Array]:
-    """The mode of a verdict by component, empty without a mode; its radii are those of the profile's nodes."""
-    mode = verdict.mode
-    if mode is None or verdict.coefficients is None:
-        return {}
-    return {**{key: values for key, values in mode.items() if key != "r"}, "coefficients": verdict.coefficients}
-
-
-def _zone_variables(branch: Branch) -> dict[str, _Variable]:
-    """The zones one after the other, for readers of the file: a loaded branch finds them again from its states."""
-    from .table import ZONE_COLUMNS, zone_rows
-
-    table = list(zone_rows(branch))
-    columns = zip(*table, strict=True) if table else ([] for _ in ZONE_COLUMNS)
-    return {f"zone_{name}": (("zone",), typed(name, column)) for name, column in zip(ZONE_COLUMNS, columns, strict=True)}
-
-
-def _estimate_variables(branch: Branch) -> dict[str, _Variable]:
-    """All of the error estimates, which :func:`_estimates` needs to build them again."""
-    from .table import estimated
-
-    found = [eq.error_estimate(estimated(branch.scene)[0]) for eq in branch]
-    parts = {"error_value": "value", "error_estimate": "error"}
-    words = {"error_control": "control", "error_method": "method", "error_reason": "reason"}
-    numbers = {
-        variable: np.array([[getattr(getattr(e, q), part) for q in ESTIMATED] for e in found]).reshape(len(found), len(ESTIMATED))
-        for variable, part in parts.items()
-    }
-    return {
-        "estimated": (("estimated",), np.array(ESTIMATED, dtype=str)),
-        **{variable: (("step", "estimated"), values) for variable, values in numbers.items()},
-        **{variable: (("step",), np.array([getattr(e, word) for e in found], dtype=str)) for variable, word in words.items()},
-    }
-
-
-def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, _Variable]:
+def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, Variable]:
     dimension = prefix + "point"
     numbers = {prefix + name: ((dimension,), typed(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
-    kinds: dict[str, _Variable] = {prefix + "kind": ((dimension,), typed("kind", (str(p.kind) for p in points)))}
-    tangents: dict[str, _Variable] = {}
+    kinds: dict[str, Variable] = {prefix + "kind": ((dimension,), typed("kind", (str(p.kind) for p in points)))}
+    tangents: dict[str, Variable] = {}
     if any(p.tangent is not None for p in points):
         none = np.full(width + 1, np.nan)
         tangents[prefix + "tangent"] = (dimension, "unknown"), np.array([none if p.tangent is None else p.tangent for p in points])
@@ -256,25 +190,9 @@ def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) 
 def _describe(name: str) -> dict[str, str]:
     prefix = next((p for p in (_SPECIAL, _LIMIT) if name.startswith(p)), "")
     base = name.removeprefix(prefix).removeprefix("equilibrium_")
-    known = QUANTITIES.get(base)
-    meaning, unit = (_about_verdict(base), "1") if known is None else (known.meaning, known.unit)
+    known = quantity(base)
+    meaning, unit = (base, "1") if known is None else (known.meaning, known.unit)
     return {"long_name": meaning if base == name else f"{meaning}, at the special point", "units": unit}
-
-
-def _about_verdict(name: str) -> str:
-    """What a variable that belongs to a verdict means: its name ends in a control or in n and the number of waves."""
-    about = {
-        "lambda_error": "bound on the algebraic error of the smallest eigenvalue",
-        "lambda": "smallest eigenvalue, omega^2 rho_m R0^2/mu",
-        "verdict": "stability",
-        "negative_directions": f"number of negative eigenvalues ({_UNCOUNTED}: not counted)",
-        "reason": "reason of the verdict",
-        "mode": "shape of the smallest eigenvalue's mode (none: NaN)",
-    }
-    kind = next((k for k in about if name.startswith(k + "_")), "")
-    tag, _, part = name.removeprefix(kind + "_").partition("_")
-    against = f"azimuthal mode n = {tag[1:]}" if tag[1:].isdigit() else f"axisymmetric shapes under {tag} control"
-    return f"{about[kind]}, {against}" + (f": {part}" if part else "") if kind else name
 
 
 def _attributes(branch: Branch) -> dict[str, Any]:
@@ -401,11 +319,8 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
     from .records import Branch
 
     equilibria = tuple(_equilibria(dataset, scene))
-    for tag, control, azimuthal in _asked(scene):
-        for equilibrium, verdict in zip(equilibria, _verdicts(dataset, tag, control, azimuthal), strict=True):
-            equilibrium._verdicts[control, azimuthal] = verdict
-    for equilibrium, estimate in zip(equilibria, _estimates(dataset), strict=False):
-        equilibrium._errors[estimate.control] = estimate
+    for analysis in asked(scene):
+        analysis.restore(dataset, scene, equilibria)
     return Branch(
         scene=scene,
         equilibria=equilibria,
@@ -504,40 +419,3 @@ def _unknowns(scene: Scene) -> int:
     from ..discretization.space import space_of_scene
 
     return int(space_of_scene(scene).n_free)
-
-
-def _verdicts(dataset: xarray.Dataset, tag: str, control: str | None, azimuthal: int) -> Iterator[Verdict]:
-
-    parts = {str(name).removeprefix(f"mode_{tag}_"): v.values for name, v in dataset.items() if str(name).startswith(f"mode_{tag}_")}
-    for k in range(dataset.sizes["step"]):
-        mode = {"r": dataset["r"].values, **{key: values[k] for key, values in parts.items()}}
-        coefficients = mode.pop("coefficients", None)
-        known = coefficients is not None and not np.isnan(coefficients).any()
-        count = int(dataset[f"negative_directions_{tag}"].values[k])
-        yield Verdict(
-            stable=_STABLE[str(dataset[f"verdict_{tag}"].values[k])],
-            smallest_eigenvalue=float(dataset[f"lambda_{tag}"].values[k]),
-            error=float(dataset[f"lambda_error_{tag}"].values[k]),
-            control=control,
-            azimuthal=azimuthal,
-            negative_directions=None if count == _UNCOUNTED else count,
-            reason=str(dataset[f"reason_{tag}"].values[k]),
-            coefficients=coefficients if known else None,
-            _shape=partial(_stored_shape, mode) if known else None,
-        )
-
-
-def _estimates(dataset: xarray.Dataset) -> Iterator[ErrorEstimate]:
-
-    if "error_estimate" not in dataset:
-        return
-    names = [str(name) for name in dataset["estimated"].values]
-    for k in range(dataset.sizes["step"]):
-        values, errors = (dict(zip(names, dataset[v].values[k].tolist(), strict=True)) for v in ("error_value", "error_estimate"))
-        control, method, reason = (str(dataset[f"error_{word}"].values[k]) for word in ("control", "method", "reason"))
-        yield from_numbers(control, values, errors, method, reason)
-
-
-def _stored_shape(mode: Mapping[str, Array], _: Array) -> Mapping[str, Array]:
-    """In place of the function that finds the shape of a mode from its coefficients: the shape that was found."""
-    return mode

@@ -3,6 +3,7 @@
 from .analysis import MAX_WAVES as MAX_WAVES
 from .analysis import WRINKLING as WRINKLING
 from .analysis import Analysis as Analysis
+from .analysis import Perturbations as Perturbations
 from .run import MAX_STEPS as MAX_STEPS
 from .run import QUANTITIES as QUANTITIES
 from .run import Run as Run

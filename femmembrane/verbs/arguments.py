@@ -8,15 +8,17 @@ from typing import Any
 from ..checks import choice, is_whole, whole
 from ..errors import InputError
 from ..potential import Potential
+from ..results.analyses import asked
 from ..scene import MAX_STEPS, Scene
 
 ILL_POSED = ("stop", "mark")
 
 
 def check_scene(scene: Any) -> None:
-    """Raise InputError for what is no scene, such as the path of its file."""
+    """Raise InputError for what is no scene, such as the path of its file, and for one that asks for an analysis that nobody registered."""
     if not isinstance(scene, Scene):
         raise InputError("scene", scene, "a Scene is allowed; Scene.from_toml reads one from a file")
+    asked(scene)
 
 
 def check_max_steps(max_steps: Any) -> None:

@@ -52,4 +52,4 @@ def _carried(start: Equilibrium | None, scene: Scene) -> Equilibrium | None:
     if not isinstance(start, Equilibrium):
         return start
     state = transferred(start.potential.space, start.state, potential_of(scene).space)
-    return replace(start, scene=scene, state=state, _verdicts={}, _zones={}, _errors={})
+    return replace(start, scene=scene, state=state, _answers={})

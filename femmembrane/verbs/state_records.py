@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
+from ..results.analyses import asked
 from ..results.records import Branch, Equilibrium, PathMemory, SpecialPoint
-from ..results.verdict import Verdict
 from ..scene import Scene
 from ..solve.controls import Gas, PressureControl, VolumeControl
 from ..solve.newton import RESIDUAL, correct, relative_residual
 from ..solve.special_points import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
-from ..stability.checked_verdict import checked_verdict
 
 OnStep = Callable[[int, int, Equilibrium], None]
 #: called after each step with the branch so far, from which the run can be resumed
@@ -75,19 +75,14 @@ def record(
     clock: float | None = None,
     gas: Gas | None = None,
 ) -> Equilibrium:
-    """The public record of a solver's state, with the verdicts that the scene asks for.
+    """The public record of a solver's state, with what the scene asks of it at once.
 
     ``previous`` lends its modes as starting guesses; ``clock`` is the time at which work on this state began.
     """
-    verdicts: dict[tuple[str | None, int], Verdict] = {}
-    asked: list[tuple[str | None, int]] = [(control, 0) for control in scene.analysis.stability]
-    for control, n in [*asked, *((None, n) for n in scene.analysis.azimuthal_modes)]:
-        guess = previous.verdict(control, azimuthal=n).coefficients if previous is not None else None
-        verdicts[control, n] = checked_verdict(potential, state.x, state.pressure, state.evaluation, control, n, guess=guess)
     bad = ill_posed(potential, state.evaluation)
     coefficients = state.x.copy()
     coefficients.flags.writeable = False
-    return Equilibrium(
+    equilibrium = Equilibrium(
         pressure=float(state.pressure),
         volume=state.evaluation.volume,
         center_height=potential.space.center_height(state.x),
@@ -99,10 +94,11 @@ def record(
         scene=scene,
         state=coefficients,
         load_energy=state.evaluation.load_energy,
-        seconds=0.0 if clock is None else time.perf_counter() - clock,
         gas=gas,
-        _verdicts=verdicts,
     )
+    for analysis in asked(scene):
+        analysis.compute(equilibrium, previous, state.evaluation)
+    return equilibrium if clock is None else replace(equilibrium, seconds=time.perf_counter() - clock)
 
 
 def special_point(scene: Scene, potential: Potential, located: Located, azimuthal: int = 0) -> SpecialPoint:

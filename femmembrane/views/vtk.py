@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError
 from ..files import refuse_no_folder, replace_file
+from ..results.analyses import asked
 
 if TYPE_CHECKING:
     from ..results.records import Equilibrium
@@ -212,14 +213,14 @@ def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: 
 
 
 def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolution: Revolution) -> dict[str, NDArray[Any]]:
-    """What is known at the points of a surface: displacement, stretches and stresses, and the zone if the scene asks for wrinkling."""
+    """What is known at the points of a surface: displacement, stretches, stresses, and what the analyses of the scene tell there."""
     parameters = equilibrium.potential.space.node_parameters()
     R, Z = equilibrium.scene.mesh.position(parameters)
     moved = revolution.vectors(profile["rho"] - R, profile["eta"] - Z)
     data: dict[str, NDArray[Any]] = {"displacement": shown_length(equilibrium) * moved}
     data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
-    if equilibrium.scene.analysis.wrinkling:
-        data["zone"] = revolution.scalars(equilibrium.zones().numbers(parameters).astype(np.int32))
+    for analysis in asked(equilibrium.scene):
+        data |= {name: revolution.scalars(values) for name, values in analysis.at_nodes(equilibrium).items()}
     return data
 
 

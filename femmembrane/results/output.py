@@ -20,7 +20,8 @@ from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version
 from . import door
 from .analyses import asked, registered
-from .store import reason, save
+from .netcdf import reason
+from .store import save
 from .table import write_csv, write_special_points_csv
 
 if TYPE_CHECKING:

@@ -101,20 +101,18 @@ QUANTITIES: Mapping[str, Quantity] = {
 }
 #: the quantities that tell where on a branch an equilibrium lies
 PLACES = ("volume", "pressure", "center_height")
+#: of the quantities of a verdict, whose names go on with a control or the number of waves
+_OF_VERDICTS: Mapping[str, type[int] | type[str]] = {"verdict": str, "reason": str, "negative": int}
 
 
 def heading(name: str) -> str:
     """The heading of a column where a person reads the table."""
-    from .analyses import quantity
-
-    known = quantity(name)
+    known = QUANTITIES.get(name)
     return known.symbol if known is not None and known.symbol else name.replace("_", " ")
 
 
 def typed(name: str, values: Iterable[Any]) -> NDArray[Any]:
     """Values of a quantity as an array of its type, whatever their number."""
-    from .analyses import quantity
-
-    known = quantity(name)
-    kind = float if known is None else known.type
+    known = QUANTITIES.get(name)
+    kind = _OF_VERDICTS.get(name.partition("_")[0], float) if known is None else known.type
     return np.array(list(values), dtype={float: np.float64, int: np.int64, str: np.str_}[kind])

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from .. import files
 from ..errors import unknown_name
-from .analyses import ANALYSES, asked
+from .analyses import ANALYSES, asked, typed_column
 from .analyses.base import Cell, EquilibriumAnalysis
-from .quantities import typed
 
 if TYPE_CHECKING:
     import pandas
@@ -78,7 +77,7 @@ def column(branch: Branch, name: str) -> NDArray[Any]:
     known = known_columns(branch)
     if name not in known and not (isinstance(name, str) and any(analysis.knows(name) for analysis in ANALYSES)):
         raise unknown_name("column", name, known)
-    return typed(name, starmap(reader(branch.scene, name), enumerate(branch)))
+    return typed_column(name, starmap(reader(branch.scene, name), enumerate(branch)))
 
 
 def rows(branch: Branch) -> Iterator[list[Cell]]:

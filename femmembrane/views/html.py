@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..results.analyses import remarks
-from ..results.quantities import heading
+from ..results.analyses import column_heading, remarks
 
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
@@ -54,7 +53,7 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
     readers = [reader(branch.scene, name) for name in names]
     shown = {round(step) for step in np.linspace(0, len(branch) - 1, min(most, len(branch)))}
     cells = [[read(step, branch[step]) for read in readers] for step in sorted(shown)]
-    return [heading(name) for name in names], cells
+    return [column_heading(name) for name in names], cells
 
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:

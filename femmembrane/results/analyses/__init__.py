@@ -5,11 +5,14 @@ Whoever writes a table, a file or a page asks :func:`asked` for the analyses of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError, unknown_name
-from ..quantities import QUANTITIES, Quantity
+from ..quantities import Quantity, heading, typed
 from .base import EquilibriumAnalysis, PrintedColumn, Remark
 from .error_estimates import ErrorEstimates
 from .pascals import Pascals
@@ -66,7 +69,18 @@ def remarks(equilibrium: Equilibrium) -> list[Remark]:
     return [remark for analysis in asked(equilibrium.scene) for remark in analysis.remarks(equilibrium)]
 
 
-def quantity(name: str) -> Quantity | None:
-    """What a column or variable means: of the table of quantities, else of the analysis whose own it is."""
-    known = QUANTITIES.get(name)
-    return known or next((found for analysis in registered() if (found := analysis.quantity(name)) is not None), None)
+def own_quantity(name: str) -> Quantity | None:
+    """What a column or variable means that is an analysis' own; None for others, which the table of quantities has."""
+    return next((found for analysis in registered() if (found := analysis.quantity(name)) is not None), None)
+
+
+def typed_column(name: str, values: Iterable[Any]) -> NDArray[Any]:
+    """The cells of a column as an array of its type."""
+    own = own_quantity(name)
+    return typed(name, values) if own is None else np.array(list(values), dtype=own.type)
+
+
+def column_heading(name: str) -> str:
+    """The heading of a column where a person reads the table."""
+    own = own_quantity(name)
+    return own.symbol if own is not None and own.symbol else heading(name)

@@ -83,7 +83,7 @@ class EquilibriumAnalysis:
         return found
 
     def quantity(self, name: str) -> Quantity | None:
-        """What a column or variable of its own means, where :data:`.QUANTITIES` does not say it."""
+        """What a column or variable of its own means, where the table of quantities does not say it."""
         return None
 
     # --- files

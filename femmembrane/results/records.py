@@ -113,7 +113,14 @@ class Equilibrium:
         return answer
 
     def remember(self, key: Key, answer: Any) -> None:
-        """Take an answer that was found before, such as one that stood in a file."""
+        """Take an answer that was found before, such as one that stood in a file.
+
+        Parameters
+        ----------
+        key : tuple
+            As in :meth:`remembered`.
+        answer : object
+        """
         self._answers[key] = answer
 
     def profile(self, r: ArrayLike | None = None) -> dict[str, Array]:

@@ -178,9 +178,7 @@ def read_branch_file(path: str | PathLike[str]) -> xarray.Dataset:
 
 def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
     equilibria = tuple(equilibria_of(dataset, scene))
-    for analysis in asked(scene):
-        analysis.restore(dataset, scene, equilibria)
-    return Branch(
+    branch = Branch(
         scene=scene,
         equilibria=equilibria,
         special_points=special_points_of(dataset, scene, SPECIAL),
@@ -193,3 +191,6 @@ def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
         solver=str(dataset.attrs.get("solver", "")),
         remarks=tuple(map(str, json.loads(dataset.attrs.get("remarks", "[]")))),
     )
+    for analysis in asked(scene):
+        analysis.restore(dataset, branch)
+    return branch

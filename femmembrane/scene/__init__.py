@@ -1,6 +1,7 @@
 """What exists and what is asked of it: the scene, its tables in a file, single keys of them, and numbers that vary."""
 
 from .analysis import MAX_WAVES as MAX_WAVES
+from .analysis import VERDICTS as VERDICTS
 from .analysis import WRINKLING as WRINKLING
 from .analysis import Analysis as Analysis
 from .analysis import Perturbations as Perturbations

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
+from ..checks import store
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
 from ..results.analyses import asked
@@ -98,7 +98,9 @@ def record(
     )
     for analysis in asked(scene):
         analysis.compute(equilibrium, previous, state.evaluation)
-    return equilibrium if clock is None else replace(equilibrium, seconds=time.perf_counter() - clock)
+    if clock is not None:  # written last, for answers take time
+        store(equilibrium, seconds=time.perf_counter() - clock)
+    return equilibrium
 
 
 def special_point(scene: Scene, potential: Potential, located: Located, azimuthal: int = 0) -> SpecialPoint:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from ...scene import Scene
     from ..records import Equilibrium
 
-VERDICTS = Verdicts()
+_VERDICTS = Verdicts()
 #: those that a scene asks for by keys of their own, in the order of their columns
-ANALYSES: tuple[EquilibriumAnalysis, ...] = (VERDICTS, Pascals(), WrinkledZones(), ErrorEstimates())
+ANALYSES: tuple[EquilibriumAnalysis, ...] = (_VERDICTS, Pascals(), WrinkledZones(), ErrorEstimates())
 #: those that a scene asks for by name, in ``analysis.extra``
 EXTRA: dict[str, EquilibriumAnalysis] = {}
 
@@ -60,7 +60,7 @@ def _named(key: str, name: str) -> EquilibriumAnalysis:
 def printed(scene: Scene) -> list[PrintedColumn]:
     """The columns of ``print(branch)``: verdicts in any case, and those of the analyses that the scene asks for."""
     wanted = asked(scene)
-    shown = wanted if VERDICTS in wanted else [VERDICTS, *wanted]
+    shown = wanted if _VERDICTS in wanted else [_VERDICTS, *wanted]
     return [column for analysis in shown for column in analysis.printed(scene)]
 
 

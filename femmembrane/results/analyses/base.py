@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,8 @@ class EquilibriumAnalysis:
         only.
     """
 
-    tables: Mapping[str, Callable[[Branch, Path], object]] = {}
-    pictures: Mapping[str, Callable[[Branch, Path], object]] = {}
+    tables: ClassVar[Mapping[str, Callable[[Branch, Path], object]]] = {}
+    pictures: ClassVar[Mapping[str, Callable[[Branch, Path], object]]] = {}
 
     def asked(self, scene: Scene) -> bool:
         """Whether a scene asks for it; of one that is registered under a name, the scene names it in ``analysis.extra``."""
@@ -92,8 +92,8 @@ class EquilibriumAnalysis:
         """What a NetCDF file holds beside the columns: all that :meth:`restore` needs."""
         return {}
 
-    def restore(self, dataset: xarray.Dataset, scene: Scene, equilibria: Sequence[Equilibrium]) -> None:
-        """Let equilibria that were read from a file remember the answers that stand in it.
+    def restore(self, dataset: xarray.Dataset, branch: Branch) -> None:
+        """Let the equilibria of a branch that was read from a file, and those of its special points, remember the answers that stand in it.
 
         Without this they are found again from the states, when somebody asks.
         """

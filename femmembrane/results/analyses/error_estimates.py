@@ -49,8 +49,8 @@ class ErrorEstimates(EquilibriumAnalysis):
             **{variable: (("step",), np.array([getattr(e, word) for e in found], dtype=str)) for variable, word in words.items()},
         }
 
-    def restore(self, dataset: xarray.Dataset, scene: Scene, equilibria: Sequence[Equilibrium]) -> None:
-        for equilibrium, estimate in zip(equilibria, _stored(dataset), strict=False):
+    def restore(self, dataset: xarray.Dataset, branch: Branch) -> None:
+        for equilibrium, estimate in zip(branch, _stored(dataset), strict=False):
             equilibrium.remember(("errors", estimate.control), estimate)
 
     def section(self, branch: Branch) -> Section:

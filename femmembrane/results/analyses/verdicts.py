@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...scene import Perturbations
+from ...scene import VERDICTS, Perturbations
 from .. import door
 from ..quantities import Quantity, typed
 from ..verdict import Verdict
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from ...scene import Scene
     from ..records import Branch, Equilibrium
 
-#: the order in which verdicts of the two controls are listed; those that are printed of a scene that asks for none
-CONTROLS = ("pressure", "volume")
-_COLUMN = re.compile(rf"(lambda|verdict)_(?:({'|'.join(CONTROLS)})|n([1-9]\d*))")
+#: controls whose verdicts are printed of a scene that asks for none
+_PRINTED = ("pressure", "volume")
+_COLUMN = re.compile(rf"(lambda|verdict)_(?:({'|'.join(VERDICTS)})|n([1-9]\d*))")
 _STABLE = {"stable": True, "unstable": False, "marginal": None}
 #: in place of a number of negative directions that was not determined
 _UNCOUNTED = -1
@@ -57,13 +57,13 @@ class Verdicts(EquilibriumAnalysis):
     # --- tables
 
     def columns(self, scene: Scene) -> Sequence[str]:
-        controls = [control for control in CONTROLS if control in scene.analysis.stability]
+        controls = [control for control in VERDICTS if control in scene.analysis.stability]
         waves = (f"lambda_{p.tag}" for p in scene.analysis.verdicts if p.azimuthal)
         return (*(f"lambda_{c}" for c in controls), *(f"verdict_{c}" for c in controls), *waves)
 
     def more_columns(self) -> Sequence[str]:
         """Those against perturbations of any number of waves are not listed."""
-        return tuple(f"{kind}_{control}" for kind in ("lambda", "verdict") for control in CONTROLS)
+        return tuple(f"{kind}_{control}" for kind in ("lambda", "verdict") for control in VERDICTS)
 
     def knows(self, column: str) -> bool:
         return _COLUMN.fullmatch(column) is not None
@@ -93,10 +93,10 @@ class Verdicts(EquilibriumAnalysis):
             found |= _variables(p.tag, [_verdict(equilibrium, p) for equilibrium in branch])
         return found
 
-    def restore(self, dataset: xarray.Dataset, scene: Scene, equilibria: Sequence[Equilibrium]) -> None:
+    def restore(self, dataset: xarray.Dataset, branch: Branch) -> None:
         """Modes included, to the last bit: eigenvalues found again from other guesses would differ in their last digits."""
-        for p in scene.analysis.verdicts:
-            for equilibrium, verdict in zip(equilibria, _stored(dataset, p), strict=True):
+        for p in branch.scene.analysis.verdicts:
+            for equilibrium, verdict in zip(branch, _stored(dataset, p), strict=True):
                 equilibrium.remember(("verdict", p.control, p.azimuthal), verdict)
 
     # --- words and pages
@@ -113,7 +113,7 @@ class Verdicts(EquilibriumAnalysis):
         def word(control: str, equilibrium: Equilibrium) -> str:
             return equilibrium.verdict(control).word
 
-        return [PrintedColumn(f"under {c}", partial(word, c), 14) for c in scene.analysis.stability or CONTROLS]
+        return [PrintedColumn(f"under {c}", partial(word, c), 14) for c in scene.analysis.stability or _PRINTED]
 
     def section(self, branch: Branch) -> Section:
         rows, last, curves = [], [], {}

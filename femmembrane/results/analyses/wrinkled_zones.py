@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,8 @@ def write_zones_csv(branch: Branch, path: str | PathLike[str]) -> None:
 class WrinkledZones(EquilibriumAnalysis):
     """The zones by the signs of the principal stresses, and their parts of the area; a loaded branch finds them again from its states."""
 
-    tables: Mapping[str, Any] = {"zones.csv": write_zones_csv}
-    pictures: Mapping[str, Any] = {"zones.png": door.plot_zones}
+    tables: ClassVar = {"zones.csv": write_zones_csv}
+    pictures: ClassVar = {"zones.png": door.plot_zones}
 
     def asked(self, scene: Scene) -> bool:
         return bool(scene.analysis.wrinkling)

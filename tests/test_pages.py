@@ -145,3 +145,34 @@ def test_the_load_that_is_added():
     eq = fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=DISC, loads=[foundation(100.0)]), pressure=0.01)
     r = np.linspace(0.0, 0.7, 5)
     assert eq.profile(r)["eta"] == pytest.approx(np.full(5, 1e-4), rel=1e-3)
+
+
+def test_the_analysis_that_is_added(monkeypatch, tmp_path):
+    """Registered, it is a column, a variable with a meaning, a remark and a section; it comes back from the file, and nobody else pays."""
+    from femmembrane.cli import progress
+    from femmembrane.results.analyses import EXTRA
+    from femmembrane.views import html, report, viewer
+
+    analysis = example("An analysis")["PoleStretch"]()
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=DISC, analysis=fm.Analysis(extra=["pole_stretch"]))
+    with pytest.raises(fm.InputError, match=r"analysis.extra\[0\] = 'pole_stretch': no analysis"):
+        fm.inflate(scene, volumes=[1.0])
+    monkeypatch.setitem(EXTRA, "pole_stretch", analysis)
+    branch = fm.inflate(fm.Scene.from_dict(scene.to_dict()), volumes=[1.0, 2.0])
+    expected = [eq.profile()["stretch_1"][0] for eq in branch]
+    assert expected[1] > expected[0] > 1.1
+    assert branch.column("pole_stretch").tolist() == branch.to_dataframe()["pole_stretch"].tolist() == pytest.approx(expected, rel=1e-9)
+    assert branch.to_xarray()["pole_stretch"].attrs == {"long_name": "meridional stretch at the pole", "units": "1"}
+    branch.save(tmp_path / "branch.nc")
+    loaded = fm.load(tmp_path / "branch.nc")
+    assert loaded.scene == branch.scene
+    assert loaded.column("pole_stretch").tolist() == branch.column("pole_stretch").tolist()
+    words = f"{expected[1]:.4g}"
+    assert ("stretch at the pole", words) in html.equilibrium_pairs(branch[1])
+    assert progress._line(branch[1]).endswith(f"pole: {words}")
+    assert viewer._caption(branch[1], 1, 2).endswith(f"stretch {words} at the pole")
+    assert '<section id="pole">' in report.report(branch)
+    plain = fm.inflate(scene.replace(analysis=fm.Analysis()), volumes=[1.0])
+    assert "pole_stretch" not in plain.to_dataframe()
+    with pytest.raises(fm.InputError, match=r"analysis.extra\[0\] = 'pole_strech': unknown; did you mean 'pole_stretch'"):
+        fm.inflate(scene.replace(analysis=fm.Analysis(extra=["pole_strech"])), volumes=[1.0])

@@ -48,7 +48,7 @@ class _Bar:
         self._progress.stop()
 
     def step(self, count: int, total: int, equilibrium: Equilibrium) -> None:
-        line = _line(self._scene, equilibrium)
+        line = _line(equilibrium)
         line = line if self._known else f"step {count}, {_way(self._scene, equilibrium)}  {line}"
         self._progress.update(self._task, completed=count, total=total, description=line)
 
@@ -64,7 +64,8 @@ def _way(scene: Scene, equilibrium: Equilibrium) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {getattr(equilibrium, name):.4g} until {end:.4g}" for name, end in until.items())
 
 
-def _line(scene: Scene, equilibrium: Equilibrium) -> str:
-    verdicts = [f"{control}: {equilibrium.verdict(control).word}" for control in scene.analysis.stability]
-    verdicts += [f"n = {n}: {equilibrium.verdict(azimuthal=n).word}" for n in scene.analysis.azimuthal_modes]
-    return "  ".join([f"V = {equilibrium.volume:.4g}", f"P = {equilibrium.pressure:.4g}", *verdicts])
+def _line(equilibrium: Equilibrium) -> str:
+    from ..results.analyses import remarks
+
+    answers = [remark.terminal for remark in remarks(equilibrium) if remark.terminal]
+    return "  ".join([f"V = {equilibrium.volume:.4g}", f"P = {equilibrium.pressure:.4g}", *answers])

@@ -44,9 +44,9 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
     """
     asked = read(scene, changes)
     from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
-    from ..results.output import RUN_FILES, SURFACES_FOLDER
+    from ..results.output import SURFACES_FOLDER, run_files
 
-    with working(out, (*RUN_FILES, NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
+    with working(out, (*run_files(), NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
         kept = unfinished(out) if resume else None
         if kept is not None:
             same_scene(asked, kept, "--resume")

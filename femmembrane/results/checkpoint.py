@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..origin import difference, origin
 from .store import branch_of, read_branch_file, save
-from .table import columns, estimated, value
+from .table import columns, reader
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -61,10 +61,10 @@ class Checkpoints:
 
     def _analyse(self, branch: Branch) -> None:
         """Compute what the results will say about the new equilibria. They remember it, so that saving takes no longer than writing."""
-        names, (held, _) = columns(branch), estimated(branch.scene)
+        readers = [reader(branch.scene, name) for name in columns(branch)]
         for equilibrium in branch.equilibria[self._analysed :]:
-            for name in names:
-                value(equilibrium, 0, name, held)
+            for read in readers:
+                read(0, equilibrium)
         self._analysed = len(branch)
 
     def save(self) -> bool:

@@ -36,12 +36,19 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
 
 
 def checked_verdict(
-    potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str | None, azimuthal: int, compliance: float | None
+    potential: Potential,
+    x: Array,
+    pressure: float,
+    evaluation: Evaluation,
+    control: str | None,
+    azimuthal: int,
+    guess: Array | None = None,
+    compliance: float | None = None,
 ) -> Verdict:
     """See :func:`femmembrane.stability.checked_verdict.checked_verdict`."""
     from ..stability.checked_verdict import checked_verdict
 
-    return checked_verdict(potential, x, pressure, evaluation, control, azimuthal, compliance=compliance)
+    return checked_verdict(potential, x, pressure, evaluation, control, azimuthal, guess=guess, compliance=compliance)
 
 
 def natural_frequencies(potential: Potential, x: Array, pressure: float, n: int, count: int, control: str) -> tuple[Vibration, ...]:
@@ -87,6 +94,13 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
     from ..views.plots import plot_zones
 
     return plot_zones(branch, path)
+
+
+def draw_zones(axes: Any, branch: Branch) -> Sequence[Any]:
+    """See :func:`femmembrane.views.plots.draw_zones`."""
+    from ..views.plots import draw_zones
+
+    return draw_zones(axes, branch)
 
 
 def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -> Any:

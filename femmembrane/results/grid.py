@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..origin import package_version
-from .store import read_dataset, reason, write_dataset
+from .netcdf import read_dataset, reason, write_dataset
 
 if TYPE_CHECKING:
     import xarray

@@ -19,31 +19,35 @@ from ..files import read_bytes, refuse_obstacles, replace_file
 from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version
 from . import door
-from .store import reason, save
-from .table import write_csv, write_special_points_csv, write_zones_csv
+from .analyses import asked, registered
+from .netcdf import reason
+from .store import save
+from .table import write_csv, write_special_points_csv
 
 if TYPE_CHECKING:
     from .records import Branch
 
-#: the record of a run, which makes its folder complete, and all files of a run, in the order in which they are listed
+#: the record of a run, which makes its folder complete
 RECORD = "run.json"
-RUN_FILES = (
-    *("branch.csv", "special_points.csv", "zones.csv", RECORD),
-    *("branch.nc", "pressure-volume.png", "zones.png", "membrane.pvd"),
-    "report.html",  # written from the other files, when it is asked for
-)
 #: the folder of the surfaces of a run
 SURFACES_FOLDER = "membrane"
+
+
+def run_files() -> tuple[str, ...]:
+    """All files that a run may leave behind, in the order in which they are listed."""
+    tables, pictures = ([name for a in registered() for name in getattr(a, kind)] for kind in ("tables", "pictures"))
+    last = "report.html"  # written from the rest, by whom it is asked for
+    return ("branch.csv", "special_points.csv", *tables, RECORD, "branch.nc", "pressure-volume.png", *pictures, SURFACES, last)
 
 
 def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:
     """Write everything that is known of a branch to a folder.
 
-    ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), ``zones.csv`` and ``zones.png`` (when the
-    scene asks for wrinkling), ``pressure-volume.png``, ``membrane.pvd`` with one VTU file an equilibrium in ``membrane/`` and, last,
-    ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without equilibria leaves
-    ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write are removed, so that the
-    folder speaks of one run only.
+    ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), the files of the analyses that the scene
+    asks for (of wrinkling ``zones.csv`` and ``zones.png``), ``pressure-volume.png``, ``membrane.pvd`` with one VTU file an equilibrium in
+    ``membrane/`` and, last, ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without
+    equilibria leaves ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write are
+    removed, so that the folder speaks of one run only.
 
     Parameters
     ----------
@@ -65,14 +69,15 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
         When some files could not be written (a full disk); all others were.
     """
     folder = _writable(Path(directory))
-    refuse_obstacles(folder, RUN_FILES, (SURFACES_FOLDER,))
+    names = run_files()
+    refuse_obstacles(folder, names, (SURFACES_FOLDER,))
     writers = _writers(branch, command)
-    for stale in {*RUN_FILES, RECORD} - (writers.keys() - {RECORD}):
+    for stale in {*names} - (writers.keys() - {RECORD}):
         (folder / stale).unlink(missing_ok=True)
     if SURFACES not in writers:
         door.remove_surfaces(folder / SURFACES)
     failed: dict[str, OSError] = {}
-    for name in sorted(writers, key=_WRITTEN.index):
+    for name in sorted(writers, key=lambda name: (name == RECORD, name != _FIRST, names.index(name))):
         if name == RECORD and failed:
             break
         try:
@@ -83,7 +88,7 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     if failed:
         first = next(iter(failed.values()))
         raise NotWrittenError(first.strerror or str(first), failed) from first
-    return [folder / name for name in RUN_FILES if name in writers]
+    return [folder / name for name in names if name in writers]
 
 
 def read_record(folder: Path) -> dict[str, Any] | None:
@@ -141,8 +146,8 @@ _FACTS = {
     *("scene", "command", "mesh", "notes", "status", "message", "equilibria", "special_points", "timings", "compiled"),
     *("versions", "platform", "processors", "written"),
 }
-#: the file that holds most in the least room comes first; the record comes last, and makes the folder complete
-_WRITTEN = ("branch.nc", *(name for name in RUN_FILES if name not in ("branch.nc", RECORD)), RECORD)
+#: what holds most in the least room is written first; the record, which makes the folder complete, last
+_FIRST = "branch.nc"
 
 
 def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Callable[[Path], object]]:
@@ -150,13 +155,12 @@ def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, C
     writers: dict[str, Callable[[Path], object]] = {"branch.csv": partial(write_csv, branch)}
     if branch.special_points is not None:
         writers["special_points.csv"] = partial(write_special_points_csv, branch)
-    if branch.scene.analysis.wrinkling:
-        writers["zones.csv"] = partial(write_zones_csv, branch)
+    analyses = asked(branch.scene)
+    writers |= {name: partial(write, branch) for analysis in analyses for name, write in analysis.tables.items()}
     if len(branch):
         writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(door.plot_pressure_volume, branch)}
         writers[SURFACES] = partial(door.write_vtk, branch)
-        if branch.scene.analysis.wrinkling:
-            writers["zones.png"] = partial(door.plot_zones, branch)
+        writers |= {name: partial(draw, branch) for analysis in analyses for name, draw in analysis.pictures.items()}
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
     return writers
 

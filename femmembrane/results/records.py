@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status, printable
+from ..scene import WRINKLING
 from ..solve.controls import control_kind
 from ..threads import one_thread
 from . import door
@@ -27,8 +29,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: classes of perturbations shown by ``print(branch)`` when the scene asks for none
-_SHOWN = ("pressure", "volume")
+#: what an answer is remembered under: the kind of question, then what tells two of its kind apart
+Key = tuple[Hashable, ...]
+T = TypeVar("T")
+#: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
+_OF_POTENTIAL = ("verdict", "errors")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +89,7 @@ class Equilibrium:
     seconds: float = field(default=0.0, repr=False)
     gas: Gas | None = field(default=None, repr=False)
     load_energy: float = field(default=0.0, repr=False)
-    _verdicts: dict[tuple[str | None, int], Verdict] = field(default_factory=dict, repr=False)
-    _zones: dict[str, Zones] = field(default_factory=dict, repr=False)
-    _errors: dict[str, ErrorEstimate] = field(default_factory=dict, repr=False)
+    _answers: dict[Key, Any] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
@@ -107,7 +110,33 @@ class Equilibrium:
         ----------
         scene : Scene
         """
-        return replace(self, scene=scene, _zones={})
+        return replace(self, scene=scene, _answers={key: answer for key, answer in self._answers.items() if key[0] in _OF_POTENTIAL})
+
+    def remembered(self, key: Key, find: Callable[[], T]) -> T:
+        """The answer to a question, which is asked once and remembered.
+
+        Parameters
+        ----------
+        key : tuple
+            The kind of question, then what tells two of its kind apart.
+        find : callable
+            Who answers.
+        """
+        if key not in self._answers:
+            self._answers[key] = find()
+        answer: T = self._answers[key]
+        return answer
+
+    def remember(self, key: Key, answer: Any) -> None:
+        """Take an answer that was found before, such as one that stood in a file.
+
+        Parameters
+        ----------
+        key : tuple
+            As in :meth:`remembered`.
+        answer : object
+        """
+        self._answers[key] = answer
 
     def profile(self, r: ArrayLike | None = None) -> dict[str, Array]:
         """The deformed meridian with stretches and stresses.
@@ -159,10 +188,9 @@ class Equilibrium:
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
-        key = (control, azimuthal)
-        if key not in self._verdicts or control == "gas":
-            self._verdicts[key] = self._judged(control, azimuthal, gas or self.gas)
-        return self._verdicts[key]
+        gas = gas or self.gas if control == "gas" else None
+        key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
+        return self.remembered(key, lambda: self._judged(control, azimuthal, gas))
 
     @one_thread
     def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
@@ -207,10 +235,8 @@ class Equilibrium:
         InputError
             For an unknown criterion.
         """
-        criterion = (self.scene.analysis.wrinkling or "total") if criterion is None else criterion
-        if not isinstance(criterion, str) or criterion not in self._zones:
-            self._zones[criterion] = door.find_zones(self.scene, self.state, self.pressure, criterion)
-        return self._zones[criterion]
+        criterion = choice("criterion", self.scene.analysis.zone_criterion if criterion is None else criterion, WRINKLING)
+        return self.remembered(("zones", criterion), lambda: door.find_zones(self.scene, self.state, self.pressure, criterion))
 
     @one_thread
     def error_estimate(self, control: str = "volume") -> ErrorEstimate:
@@ -229,11 +255,13 @@ class Equilibrium:
         InputError
             For an unknown control.
         """
-        control = control_kind(control).name
-        if control not in self._errors:
+        held = control_kind(control).name
+
+        def estimate() -> ErrorEstimate:
             verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
-            self._errors[control] = door.estimate_errors(self.potential, self.state, self.pressure, control, verdicts)
-        return self._errors[control]
+            return door.estimate_errors(self.potential, self.state, self.pressure, held, verdicts)
+
+        return self.remembered(("errors", held), estimate)
 
     def _repr_html_(self) -> str:
         """Numbers and verdicts with the deformed meridian, for notebooks."""
@@ -431,15 +459,14 @@ class Branch(Sequence[Equilibrium]):
         return column(self, name)
 
     def __str__(self) -> str:
-        classes = self.scene.analysis.stability or _SHOWN
-        zones = self.scene.analysis.wrinkling is not None
-        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {'under ' + c:<14}" for c in classes)
-        head += "  zones" if zones else ""
+        from .analyses import printed
+
+        columns = printed(self.scene)
+        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {c.heading:<{c.width}}" for c in columns)
         lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
             numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
-            words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
-            lines.append(numbers + words + (f"  {eq.zones().summary}" if zones else ""))
+            lines.append(numbers + "".join(f"  {c.text(eq):<{c.width}}" for c in columns))
         lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)
 

@@ -1,8 +1,10 @@
 """What exists and what is asked of it: the scene, its tables in a file, single keys of them, and numbers that vary."""
 
 from .analysis import MAX_WAVES as MAX_WAVES
+from .analysis import VERDICTS as VERDICTS
 from .analysis import WRINKLING as WRINKLING
 from .analysis import Analysis as Analysis
+from .analysis import Perturbations as Perturbations
 from .run import MAX_STEPS as MAX_STEPS
 from .run import QUANTITIES as QUANTITIES
 from .run import Run as Run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..checks import choice, sequence, store, switch, whole
@@ -12,6 +13,47 @@ VERDICTS = ("pressure", "volume")
 WRINKLING = ("total", "mechanical")
 #: largest number of waves around the axis, a thousand times more than a mesh resolves
 MAX_WAVES = 10**6
+
+
+@dataclass(frozen=True)
+class Perturbations:
+    """A class of perturbations against which a verdict is given.
+
+    Attributes
+    ----------
+    control : str or None
+        What is held against axisymmetric perturbations; None for azimuthal ones, which do not change the volume.
+    azimuthal : int
+        Number of waves around the axis; 0 for axisymmetric perturbations.
+    """
+
+    control: str | None
+    azimuthal: int = 0
+
+    @property
+    def tag(self) -> str:
+        """With what the names of its columns end: pressure, volume, n1, n2, ..."""
+        return f"n{self.azimuthal}" if self.azimuthal else str(self.control)
+
+    @property
+    def brief(self) -> str:
+        """The class in a word or two."""
+        return f"n = {self.azimuthal}" if self.azimuthal else str(self.control)
+
+    @property
+    def held(self) -> str:
+        """The class by what is held."""
+        return self.brief if self.azimuthal else f"{self.control} held"
+
+    @property
+    def against(self) -> str:
+        """The class as it goes on from a verdict: stable ..."""
+        return f"against {self.brief}" if self.azimuthal else f"under {self.control} control"
+
+    @property
+    def words(self) -> str:
+        """The class in full."""
+        return f"{self.brief} waves around the axis" if self.azimuthal else f"axisymmetric, {self.held}"
 
 
 @dataclass(frozen=True)
@@ -28,6 +70,8 @@ class Analysis:
         The principal stresses whose signs divide the membrane into taut and wrinkled zones; left out: no zones are looked for.
     error_estimates : bool
         Whether discretisation errors are estimated, by solving again in a finer space.
+    extra : sequence of str
+        Names of further analyses, of those registered in ``femmembrane.results.analyses.EXTRA``. Whoever runs the scene looks them up.
 
     Raises
     ------
@@ -39,19 +83,37 @@ class Analysis:
     azimuthal_modes: tuple[int, ...] = ()
     wrinkling: str | None = None
     error_estimates: bool = False
+    extra: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         stability = sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure" and "volume"')
         modes = sequence("analysis.azimuthal_modes", self.azimuthal_modes, "a list of whole numbers >= 1 is allowed")
+        extra = sequence("analysis.extra", self.extra, _NAMES)
         for k, name in enumerate(stability):
             choice(f"analysis.stability[{k}]", name, VERDICTS)
         modes = tuple(whole(f"analysis.azimuthal_modes[{k}]", n, most=MAX_WAVES) for k, n in enumerate(modes))
-        _unique("analysis.stability", stability)
-        _unique("analysis.azimuthal_modes", modes)
+        for k, name in enumerate(extra):
+            if not isinstance(name, str) or not name:
+                raise InputError(f"analysis.extra[{k}]", name, _NAMES)
+        for key, values in (("stability", stability), ("azimuthal_modes", modes), ("extra", extra)):
+            _unique(f"analysis.{key}", values)
         if self.wrinkling is not None:
             choice("analysis.wrinkling", self.wrinkling, WRINKLING)
         estimates = switch("analysis.error_estimates", self.error_estimates)
-        store(self, stability=stability, azimuthal_modes=modes, error_estimates=estimates)
+        store(self, stability=stability, azimuthal_modes=modes, error_estimates=estimates, extra=extra)
+
+    @cached_property
+    def verdicts(self) -> tuple[Perturbations, ...]:
+        """The classes of perturbations against which verdicts are asked for, the axisymmetric ones first."""
+        return (*map(Perturbations, self.stability), *(Perturbations(None, n) for n in self.azimuthal_modes))
+
+    @property
+    def zone_criterion(self) -> str:
+        """The stresses that tell zones apart: those asked for, else the total ones."""
+        return self.wrinkling or "total"
+
+
+_NAMES = "a list of names of registered analyses is allowed"
 
 
 def _unique(key: str, values: tuple[Any, ...]) -> None:

@@ -10,15 +10,17 @@ from ..discretization.space import anchored
 from ..discretization.supports import as_support, floats
 from ..errors import InputError
 from ..potential import Potential
+from ..results.analyses import asked
 from ..scene import MAX_STEPS, Scene
 
 ILL_POSED = ("stop", "mark")
 
 
 def check_scene(scene: Any) -> None:
-    """Raise InputError unless the argument is a scene; the path of a scene file is none."""
+    """Raise InputError for what is no scene, such as the path of its file, and for one that asks for an analysis that nobody registered."""
     if not isinstance(scene, Scene):
         raise InputError("scene", scene, "a Scene is allowed; Scene.from_toml reads one from a file")
+    asked(scene)
     _check_walls(scene)
 
 

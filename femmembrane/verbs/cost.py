@@ -214,18 +214,17 @@ def _stages(course: Course) -> list[Job]:
         factor = BorderedFactor(BandFactor(evaluation.band), -evaluation.volume_gradient, row, corner)
         factor.solve(evaluation.gradient, 0.0)
 
-    asked: list[tuple[str, str | None, int]] = [(f"verdict, {c} control", c, 0) for c in scene.analysis.stability or ("pressure", "volume")]
-    asked += [(f"verdict, n = {n}", None, n) for n in scene.analysis.azimuthal_modes or (1,)]
+    analysis = scene.analysis
+    asked = Analysis(analysis.stability or ("pressure", "volume"), analysis.azimuthal_modes or (1,)).verdicts
     stages: dict[str, Callable[[], Any]] = {
         "evaluation and assembly": lambda: potential.evaluate(x, p),
         "factorisation and solution": factorise,
     }
-    for name, control, n in asked:
+    for against in asked:
+        ask = partial(checked_verdict, potential, x, p, evaluation, against.control, against.azimuthal)
         # started from its own mode, as on a branch from that of the state before
-        guess = checked_verdict(potential, x, p, evaluation, control, n).coefficients
-        stages[name] = partial(checked_verdict, potential, x, p, evaluation, control, n, guess=guess)
-    criterion = scene.analysis.wrinkling or "total"
-    stages["zones of wrinkles"] = lambda: find_zones(scene, x, p, criterion)
+        stages[f"verdict, {against.brief}{' control' if against.control else ''}"] = partial(ask, guess=ask().coefficients)
+    stages["zones of wrinkles"] = lambda: find_zones(scene, x, p, analysis.zone_criterion)
     line = Measurement("stage", "", "", scene.degree, potential.space.n_elements, potential.space.n_free)
     return [_job(line, name, act) for name, act in stages.items()]
 
@@ -262,7 +261,7 @@ def _effects(course: Course) -> list[Job]:
     if plain.sources:
         pairs["sources"] = (plain.replace(sources=(), scales=None), plain)
     pairs["azimuthal modes"] = (plain, plain.replace(analysis=Analysis(azimuthal_modes=modes)))
-    pairs["zones of wrinkles"] = (plain, plain.replace(analysis=Analysis(wrinkling=course.scene.analysis.wrinkling or "total")))
+    pairs["zones of wrinkles"] = (plain, plain.replace(analysis=Analysis(wrinkling=course.scene.analysis.zone_criterion)))
     pairs["tension field"] = (plain, plain.replace(tension_field=True))
     jobs = []
     for name, pair in pairs.items():

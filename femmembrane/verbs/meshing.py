@@ -79,4 +79,4 @@ def carried(start: S, scene: Scene) -> S | Equilibrium:
     if not isinstance(start, Equilibrium):
         return start
     state = transferred(start.potential.space, start.state, potential_of(scene).space)
-    return replace(start, scene=scene, state=state, _verdicts={}, _zones={}, _errors={})
+    return replace(start, scene=scene, state=state, _answers={})

@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..checks import store
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
+from ..results.analyses import asked
 from ..results.records import Branch, Equilibrium, PathMemory, SpecialPoint
-from ..results.verdict import Verdict
 from ..scene import Scene
 from ..solve.continuation import BranchPoint
 from ..solve.controls import Gas, PressureControl, VolumeControl
@@ -18,7 +19,6 @@ from ..solve.newton import RESIDUAL, correct, relative_residual
 from ..solve.segment import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
-from ..stability.checked_verdict import checked_verdict
 
 OnStep = Callable[[int, int, Equilibrium], None]
 #: called after each step with the branch so far, from which the run can be resumed
@@ -76,19 +76,14 @@ def record(
     clock: float | None = None,
     gas: Gas | None = None,
 ) -> Equilibrium:
-    """The public record of a solver's state, with the verdicts that the scene asks for.
+    """The public record of a solver's state, with what the scene asks of it at once.
 
     ``previous`` lends its modes as starting guesses; ``clock`` is the time at which work on this state began.
     """
-    verdicts: dict[tuple[str | None, int], Verdict] = {}
-    asked: list[tuple[str | None, int]] = [(control, 0) for control in scene.analysis.stability]
-    for control, n in [*asked, *((None, n) for n in scene.analysis.azimuthal_modes)]:
-        guess = previous.verdict(control, azimuthal=n).coefficients if previous is not None else None
-        verdicts[control, n] = checked_verdict(potential, state.x, state.pressure, state.evaluation, control, n, guess=guess)
     bad = ill_posed(potential, state.evaluation)
     coefficients = state.x.copy()
     coefficients.flags.writeable = False
-    return Equilibrium(
+    equilibrium = Equilibrium(
         pressure=float(state.pressure),
         volume=state.evaluation.volume,
         center_height=potential.space.center_height(state.x),
@@ -100,10 +95,13 @@ def record(
         scene=scene,
         state=coefficients,
         load_energy=state.evaluation.load_energy,
-        seconds=0.0 if clock is None else time.perf_counter() - clock,
         gas=gas,
-        _verdicts=verdicts,
     )
+    for analysis in asked(scene):
+        analysis.compute(equilibrium, previous, state.evaluation)
+    if clock is not None:  # written last, for answers take time
+        store(equilibrium, seconds=time.perf_counter() - clock)
+    return equilibrium
 
 
 def special_point(scene: Scene, potential: Potential, located: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..results.quantities import heading
+from ..results.analyses import column_heading, remarks
 
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
@@ -47,18 +47,17 @@ def pairs(items: Iterable[tuple[str, Any]]) -> str:
 
 def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[list[Any]]]:
     """Headings and cells of the equilibria of a branch: all of them, or ``most`` of them, evenly spread."""
-    from ..results.table import columns, estimated, value
+    from ..results.table import columns, reader
 
     names = [name for name in columns(branch) if name not in ("iterations", "seconds")]
-    held, _ = estimated(branch.scene)
+    readers = [reader(branch.scene, name) for name in names]
     shown = {round(step) for step in np.linspace(0, len(branch) - 1, min(most, len(branch)))}
-    cells = [[value(branch[step], step, name, held) for name in names] for step in sorted(shown)]
-    return [heading(name) for name in names], cells
+    cells = [[read(step, branch[step]) for read in readers] for step in sorted(shown)]
+    return [column_heading(name) for name in names], cells
 
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
     """The numbers of an equilibrium, with the verdicts that its scene asks for."""
-    analysis = equilibrium.scene.analysis
     energies = [("elastic energy", equilibrium.elastic_energy)]
     energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []
     return [
@@ -68,9 +67,7 @@ def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
         *energies,
         ("residual", equilibrium.residual),
         ("status", equilibrium.status),
-        *((f"under {control} control", equilibrium.verdict(control).reason) for control in analysis.stability),
-        *((f"against n = {n}", equilibrium.verdict(azimuthal=n).reason) for n in analysis.azimuthal_modes),
-        *([("zones", equilibrium.zones().summary)] if analysis.wrinkling else []),
+        *((remark.subject, remark.text) for remark in remarks(equilibrium)),
     ]
 
 

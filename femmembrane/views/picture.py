@@ -213,7 +213,7 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
     if zones:
         table = pyvista.LookupTable(list(zone_colors()), n_values=len(KINDS), scalar_range=_ZONE_LIMITS)
         table.annotations = dict(enumerate(_ZONE_NAMES))
-        criterion = surface.equilibrium.scene.analysis.wrinkling or "total"
+        criterion = surface.equilibrium.scene.analysis.zone_criterion
         title = f"wrinkles by {criterion} stress"
     else:
         table = pyvista.LookupTable(_MAP, scalar_range=limits)

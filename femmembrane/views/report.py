@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from html import escape
-from itertools import groupby, pairwise
+from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,11 @@ import numpy as np
 
 from ..errors import Status
 from ..files import replace_file
-from ..results.table import estimated
+from ..results.analyses import asked
+from ..results.analyses.base import Curves, Drawing, Section
 from . import plots
 from .backend import load
-from .html import MOST_ROWS, branch_rows, pairs, table, text
+from .html import branch_rows, pairs, table, text
 from .style import STYLE
 from .surroundings import Box
 from .svg import dark, inline_svg, variable
@@ -112,9 +113,8 @@ class _Page:
         if len(self.branch):
             yield "Branch", self._branch()
             yield "Shape", self._shape()
-            yield "Verdicts", self._verdicts()
-            yield "Zones", self._zones()
-            yield "Error estimates", self._errors()
+            sections = (analysis.section(self.branch) for analysis in asked(self.branch.scene))
+            yield from ((section.title, self._analysis(section)) for section in sections if section is not None)
             yield "Equilibria", self._equilibria()
         yield "Scene", self._scene()
         yield "Timings", self._timings()
@@ -186,37 +186,15 @@ class _Page:
         along += self._figure(_along(last, stresses), "Stresses", f"Cauchy stresses over μ {at}")
         return _beside(meridians, f"<div>{along}</div>")
 
-    def _verdicts(self) -> str:
-        classes = _classes(self.branch)
-        if not classes:
-            return ""
-        rows = []
-        for name, words, _ in classes:
-            for word, steps in _runs(words):
-                span = str(steps[0]) if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
-                rows.append([name, word, span, *(_span(self.branch.column(c)[steps]) for c in ("volume", "pressure"))])
-        figure = self._figure(_eigenvalues(self.branch), "Smallest eigenvalues along the branch")
-        listed = table(["against", "verdict", "steps", "V", "P"], rows)
-        return f"{_beside(figure, listed)}<h3>The last equilibrium</h3>{pairs((name, reason) for name, _, reason in classes)}"
-
-    def _zones(self) -> str:
-        if not self.branch.scene.analysis.wrinkling:
-            return ""
-        runs = [steps for _, steps in _runs([", ".join(e.zones().kinds) for e in self.branch])]
-        shown = [step for steps in runs for step in dict.fromkeys((steps[0], steps[-1]))][:MOST_ROWS]
-        rows = [[step, self.branch[step].volume, self.branch[step].zones().summary] for step in shown]
-        caption = "First and last step with the same kinds of zones, and their parts of the reference area"
-        return _beside(self._figure(_zones(self.branch), "Taut and wrinkled zones"), table(["step", "V", "zones"], rows, caption=caption))
-
-    def _errors(self) -> str:
-        held, names = estimated(self.branch.scene)
-        if not names:
-            return ""
-        found = {name: self.branch.column(f"error_{name}") for name in names}
-        figure = self._figure(_error_curves(self.branch, found), "Estimated relative errors along the branch")
-        note = f"Relative errors of the discretisation, at the same {held.replace('_', ' ')}, from the same load in a finer space"
-        rows = [[name, *_largest(errors)] for name, errors in found.items()]
-        return _beside(figure, table(["of", "median", "largest", "there", "without an estimate"], rows, caption=note))
+    def _analysis(self, section: Section) -> str:
+        """The figure of an analysis beside its table, and what it says of the last equilibrium."""
+        parts = []
+        if section.figure is not None:
+            parts.append(self._figure(_figure_of(section.figure, self.branch), section.figure.label))
+        if section.table is not None:
+            parts.append(table(section.table.header, section.table.rows, caption=section.table.caption))
+        last = pairs((remark.subject, remark.text) for remark in section.last)
+        return _beside(*parts) + (f"<h3>The last equilibrium</h3>{last}" if section.last else "")
 
     def _equilibria(self) -> str:
         header, rows = branch_rows(self.branch)
@@ -270,28 +248,6 @@ def _shortened(part: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
-def _classes(branch: Branch) -> list[tuple[str, list[str], str]]:
-    """Name, verdicts along the branch and the last reason of every class of perturbations that the scene asks for."""
-    asked: list[tuple[str, str | None, int]] = [(f"axisymmetric, {c} held", c, 0) for c in branch.scene.analysis.stability]
-    asked += [(f"n = {n} waves around the axis", None, n) for n in branch.scene.analysis.azimuthal_modes]
-    found = []
-    for name, control, n in asked:
-        verdicts = [e.verdict(control, azimuthal=n) for e in branch]
-        found.append((name, [v.word for v in verdicts], verdicts[-1].reason))
-    return found
-
-
-def _runs(words: list[str]) -> Iterator[tuple[str, list[int]]]:
-    """Stretches of steps with the same word."""
-    for word, steps in groupby(range(len(words)), key=words.__getitem__):
-        yield word, list(steps)
-
-
-def _span(values: Array) -> str:
-    low, high = f"{values.min():.5g}", f"{values.max():.5g}"
-    return (low if low == high else f"{low} … {high}").replace("-", "−")  # noqa: RUF001
-
-
 def _legend_below(figure: Figure, axes: Any, columns: int = 1) -> None:
     handles, labels = plots.legend_entries(axes)
     if handles:
@@ -335,51 +291,35 @@ def _along(equilibrium: Equilibrium, names: tuple[str, ...]) -> Figure:
     return figure
 
 
-def _eigenvalues(branch: Branch) -> Figure:
-    """Smallest eigenvalues along the branch, on a scale that is linear around zero."""
+def _figure_of(figure: Curves | Drawing, branch: Branch) -> Figure:
+    if isinstance(figure, Curves):
+        return _curves(figure, branch)
+    drawn, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
+    handles = figure.draw(axes, branch)
+    drawn.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
+    return drawn
+
+
+def _curves(shown: Curves, branch: Branch) -> Figure:
     figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
-    analysis = branch.scene.analysis
-    names = [*((f"{c} held", f"lambda_{c}") for c in analysis.stability), *((f"n = {n}", f"lambda_n{n}") for n in analysis.azimuthal_modes)]
-    values = {label: branch.column(name) for label, name in names}
-    known = np.concatenate([v[np.isfinite(v)] for v in values.values()])
-    for k, (label, value) in enumerate(values.items()):
-        _draw_steps(axes, branch, value, k, f"λ, {label}")
+    for k, (label, value) in enumerate(shown.values.items()):
+        _draw_steps(axes, branch, np.where(np.abs(value) > 0, np.abs(value), np.nan) if shown.logarithmic else value, k, label)
+    if shown.logarithmic:
+        axes.set_yscale("log")
+    else:
+        _scale_around_zero(axes, np.concatenate([v[np.isfinite(v)] for v in shown.values.values()]))
+    axes.set_ylabel(shown.axis)
+    axes.grid(color="0.9", linewidth=0.6)
+    _legend_below(figure, axes, shown.columns)
+    return figure
+
+
+def _scale_around_zero(axes: Any, known: Array) -> None:
+    """A line at zero, and a scale that is linear around it where few values are far larger than the usual ones."""
     axes.axhline(0, color="0.4", linewidth=0.8, zorder=0)
     usual = float(np.median(np.abs(known))) if known.size else 0.0
     if usual and np.abs(known).max() > 30 * usual:
         axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
-    axes.set_ylabel("smallest eigenvalue λ")
-    axes.grid(color="0.9", linewidth=0.6)
-    _legend_below(figure, axes, columns=2)
-    return figure
-
-
-def _largest(errors: Array) -> list[Any]:
-    """Median and largest size of the errors that are known, the step of the largest, and how many are not known."""
-    known = np.flatnonzero(np.isfinite(errors))
-    if not known.size:
-        return [np.nan, np.nan, "", errors.size]
-    sizes = np.abs(errors[known])
-    middle, largest = (float(f"{size:.1e}") for size in (np.median(sizes), sizes.max()))
-    return [middle, largest, f"step {known[np.argmax(sizes)]}", errors.size - known.size]
-
-
-def _zones(branch: Branch) -> Figure:
-    figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
-    handles = plots.draw_zones(axes, branch)
-    figure.legend(handles=handles, loc="outside lower left", frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
-    return figure
-
-
-def _error_curves(branch: Branch, errors: Mapping[str, Array]) -> Figure:
-    figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
-    for k, (name, value) in enumerate(errors.items()):
-        _draw_steps(axes, branch, np.where(np.abs(value) > 0, np.abs(value), np.nan), k, name)
-    axes.set_yscale("log")
-    axes.set_ylabel("estimated relative error")
-    axes.grid(color="0.9", linewidth=0.6)
-    _legend_below(figure, axes, columns=3)
-    return figure
 
 
 def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, label: str) -> None:

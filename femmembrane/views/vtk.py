@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError
 from ..files import refuse_no_folder, replace_file
+from ..results.analyses import asked
 
 if TYPE_CHECKING:
     from ..results.records import Equilibrium
@@ -218,8 +219,8 @@ def surface_data(equilibrium: Equilibrium, profile: Mapping[str, Array], revolut
     moved = revolution.vectors(profile["rho"] - R, profile["eta"] - Z)
     data: dict[str, NDArray[Any]] = {"displacement": shown_length(equilibrium) * moved}
     data |= {name: revolution.scalars(profile[name]) for name in FIELDS if name in profile}
-    if equilibrium.scene.analysis.wrinkling:
-        data["zone"] = revolution.scalars(equilibrium.zones().numbers(parameters).astype(np.int32))
+    for analysis in asked(equilibrium.scene):
+        data |= {name: revolution.scalars(values) for name, values in analysis.at_nodes(equilibrium).items()}
     return data
 
 

@@ -69,7 +69,7 @@ _POINTS = 101
 
 def zone_label(scene: Scene, kind: str) -> str:
     """Name of a kind of zones with what decides, for a legend."""
-    pattern, criterion = PATTERNS[kind], scene.analysis.wrinkling or "total"
+    pattern, criterion = PATTERNS[kind], scene.analysis.zone_criterion
     if kind == "taut":
         return pattern.name
     why = f"{criterion} {pattern.compressed} < 0"

@@ -27,7 +27,7 @@ FAMILY = Family(7, "bad input")
 OGDEN = {"model": "ogden", "mu": [1.4910, 0.0029, -0.0236], "alpha": [1.3, 5.0, -2.0]}
 DIPOLE = {"kind": "dipole", "strength": 200.0, "height": 6.5, "orientation": 1}
 VOLUMES = {"control": "volume", "start": 0.5, "stop": 2.0, "steps": 4, "solver": "ipopt", "at_limit": "stop"}
-ANALYSIS = {"stability": ["pressure", "volume"], "azimuthal_modes": [1, 2], "wrinkling": "total", "error_estimates": False}
+ANALYSIS = {"stability": ["pressure", "volume"], "azimuthal_modes": [1, 2], "wrinkling": "total", "error_estimates": False, "extra": []}
 #: whole scenes, between them every key
 WHOLE: tuple[dict[str, Any], ...] = (
     {"title": "whole", "material": OGDEN, "membrane": {"susceptibility": 2.5, "radius_to_thickness": 1000}}
@@ -83,6 +83,7 @@ WRONG: dict[str, list[Any]] = {
     ],
     "analysis.stability": [*NOT_A_LIST[1:], [""], ["presure"], [1], ["volume", "volume"], [["volume"]], [True], [{}]],
     "analysis.azimuthal_modes": [*NOT_A_LIST[1:], [0], [-1], [1.5], ["1"], [True], [1, 1], [[1]], [{}]],
+    "analysis.extra": [*NOT_A_LIST[1:], [""], ["unknown"], [1], ["a", "a"], [["a"]], [True], [{}]],
     **dict.fromkeys(("effects.tension_field", "analysis.error_estimates"), NOT_A_SWITCH),
 }
 #: keys without which nothing can be computed, where they are given, and what is named when they are missing

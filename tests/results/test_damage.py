@@ -22,7 +22,7 @@ import femmembrane as fm
 from femmembrane import files, origin
 from femmembrane.cli import main
 from femmembrane.errors import InputError
-from femmembrane.results import checkpoint, output, store
+from femmembrane.results import checkpoint, netcdf, output
 from femmembrane.results.finished_scenes import FinishedScenes
 from tests.damage import damaged
 
@@ -216,7 +216,7 @@ def test_nothing_outside_of_a_file_is_read(tmp_path):
             del file["pressure"]
             spoil(file)
         with pytest.raises(ValueError, match=why):
-            store.parsed(path.read_bytes())
+            netcdf.parsed(path.read_bytes())
 
 
 # --- damage
@@ -271,7 +271,7 @@ def test_what_was_changed_on_purpose_is_refused_as_well(tmp_path, done):
 @pytest.mark.parametrize("count", [4, pytest.param(400, marks=pytest.mark.slow)])
 def test_damaged_files_of_earlier_versions_are_read_or_refused(count, tmp_path, monkeypatch):
     """Nothing vouches for their numbers, but nothing else than an InputError comes of them, and none takes for ever."""
-    monkeypatch.setattr(store, "_PATIENCE", 20.0)
+    monkeypatch.setattr(netcdf, "_PATIENCE", 20.0)
     path = tmp_path / "branch.nc"
     for content in damaged(OLD.read_bytes(), 2, count):
         path.write_bytes(content)
@@ -507,14 +507,14 @@ def test_analysis_is_no_saving(tmp_path, monkeypatch, old):
     monkeypatch.setattr(checkpoint.time, "perf_counter", lambda: clock[0])
     analysed = []
 
-    def value(equilibrium, *_):
+    def read(step, equilibrium):
         analysed.append(equilibrium)
         clock[0] += 10.0
 
     def save(branch, path, facts):
         clock[0] += 0.1
 
-    monkeypatch.setattr(checkpoint, "value", value)
+    monkeypatch.setattr(checkpoint, "reader", lambda scene, name: read)
     monkeypatch.setattr(checkpoint, "columns", lambda branch: ["error_pressure"])
     monkeypatch.setattr(checkpoint, "save", save)
     checkpoints = checkpoint.Checkpoints(tmp_path)

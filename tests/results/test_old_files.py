@@ -23,7 +23,7 @@ def test_a_file_of_version_0_1_0() -> None:
     assert [e.verdict("pressure").word for e in branch] == ["stable", "unstable", "unstable"]
     assert [str(p.kind) for p in branch.special_points or ()] == ["limit_point", "volume_fold"]
     assert branch[0].zones().kinds == ("double", "radial", "taut")
-    assert branch[0]._errors["volume"].pressure.relative == pytest.approx(1.70843e-4, rel=1e-4)
+    assert branch[0]._answers["errors", "volume"].pressure.relative == pytest.approx(1.70843e-4, rel=1e-4)
     assert branch.solver == ""
     assert "ipopt" not in branch.cite()
     with xarray.open_dataset(OLD, engine="h5netcdf") as dataset:

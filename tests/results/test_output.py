@@ -127,7 +127,7 @@ def test_round_trip_to_the_last_bit(judged: Branch, tmp_path: Path) -> None:
     for ours, theirs in pairs:
         assert ours.state.tobytes() == theirs.state.tobytes()
         assert not theirs.state.flags.writeable
-        for name in (f.name for f in dataclasses.fields(ours) if f.name not in ("scene", "state", "_verdicts")):
+        for name in (f.name for f in dataclasses.fields(ours) if f.name not in ("scene", "state", "_answers")):
             assert getattr(ours, name) == getattr(theirs, name), name
         assert all(np.array_equal(ours.profile()[key], theirs.profile()[key]) for key in ours.profile())
     for name in ("kind", "volume", "pressure", "center_height", "error"):
@@ -155,10 +155,10 @@ def test_verdicts_come_back(judged: Branch, tmp_path: Path) -> None:
 
 def test_verdict_without_a_mode(judged: Branch, tmp_path: Path) -> None:
     """Where the Legendre-Hadamard condition fails there is neither eigenvalue nor mode."""
-    first = dataclasses.replace(judged[0], _verdicts={})
+    first = dataclasses.replace(judged[0], _answers={})
     nothing = {"smallest_eigenvalue": np.nan, "negative_directions": None, "coefficients": None, "_shape": None}
     short_wave = dataclasses.replace(judged[0].verdict("volume"), stable=False, reason="why", **nothing)
-    first._verdicts["volume", 0] = short_wave
+    first._answers["verdict", "volume", 0] = short_wave
     for others in ((), judged.equilibria[1:]):
         store.save(dataclasses.replace(judged, equilibria=(first, *others)), tmp_path / "branch.nc")
         back = store.load(tmp_path / "branch.nc")[0].verdict("volume")
@@ -174,7 +174,7 @@ def test_azimuthal_verdicts_come_back(judged: Branch, tmp_path: Path) -> None:
         shape = {"r": nodes, "u": nodes + k, "w": nodes, "c": -nodes}
         coefficients = np.arange(40.0) + k
         verdict = Verdict(k < 2, 1.5 - k, 1e-9, None, 2, int(k == 2), f"reason {k}", coefficients, lambda _, shape=shape: shape)
-        equilibria.append(dataclasses.replace(equilibrium, scene=scene, _verdicts={(None, 2): verdict}))
+        equilibria.append(dataclasses.replace(equilibrium, scene=scene, _answers={("verdict", None, 2): verdict}))
     branch = dataclasses.replace(judged, scene=scene, equilibria=tuple(equilibria))
     store.save(branch, tmp_path / "branch.nc")
     loaded = store.load(tmp_path / "branch.nc")

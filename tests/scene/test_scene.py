@@ -143,6 +143,7 @@ analyses = st.builds(
     azimuthal_modes=st.lists(st.integers(1, 20), unique=True, max_size=3),
     wrinkling=st.sampled_from([None, "total", "mechanical"]),
     error_estimates=st.booleans(),
+    extra=st.lists(st.sampled_from(["pole_stretch", "größe"]), unique=True),
 )
 orientations = st.sampled_from([1, -1])
 dipoles = st.builds(Dipole, strength=positive | st.integers(0, 600), height=heights, orientation=orientations)
@@ -321,6 +322,9 @@ REFUSED = [
     (plain(analysis={"azimuthal_modes": [True]}), "analysis.azimuthal_modes[0]", "whole number"),
     (plain(analysis={"azimuthal_modes": 1}), "analysis.azimuthal_modes", "a list"),
     (plain(analysis={"azimuthal_modes": [1, 1]}), "analysis.azimuthal_modes", "once"),
+    (plain(analysis={"extra": "pole_stretch"}), "analysis.extra", "a list"),
+    (plain(analysis={"extra": [1]}), "analysis.extra[0]", "a list of names"),
+    (plain(analysis={"extra": ["a", "a"]}), "analysis.extra", "once"),
 ]
 
 

@@ -18,7 +18,6 @@ from femmembrane.solve.number_curve import NUMBER, TURN, ControlledProblem, Numb
 from femmembrane.solve.segment import Located, Segment
 from femmembrane.solve.special_points import branch_point
 from femmembrane.solve.state import Predictor
-
 from tests.cases import OGDEN, disc_scene
 from tests.solve.test_switching import sphere
 

@@ -19,6 +19,7 @@ from femmembrane.cli import main
 from femmembrane.discretization.space import space_of
 from femmembrane.physics.tension_field import TensionField
 from femmembrane.results import output, store, table
+from femmembrane.results.analyses.wrinkled_zones import ZONE_COLUMNS, write_zones_csv
 from femmembrane.results.zones import KINDS, Zones
 from femmembrane.stability import zones as zones_module
 from femmembrane.stability.profile import profile_at
@@ -312,7 +313,7 @@ def test_off_means_off(asked, tmp_path, monkeypatch):
 
     monkeypatch.setattr(zones_module, "find_zones", refuse)
     scene = asked.scene.replace(analysis=fm.Analysis(("volume",)))
-    plain = dataclasses.replace(asked, scene=scene, equilibria=tuple(dataclasses.replace(e, scene=scene, _zones={}) for e in asked))
+    plain = dataclasses.replace(asked, scene=scene, equilibria=tuple(dataclasses.replace(e, scene=scene, _answers={}) for e in asked))
     written = output.write_run(plain, tmp_path)
     assert not [path for path in tmp_path.iterdir() if "zones" in path.name]
     assert not [path for path in written if "zones" in path.name]
@@ -342,7 +343,7 @@ def zone_numbers(branch):
 
 
 def test_zones_csv(asked, tmp_path):
-    table.write_zones_csv(asked, tmp_path / "zones.csv")
+    write_zones_csv(asked, tmp_path / "zones.csv")
     with (tmp_path / "zones.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["step", "kind", "r_start", "r_end", "rho_start", "rho_end", "area_fraction", "deformed_area_fraction"]
@@ -355,7 +356,7 @@ def test_netcdf(asked, tmp_path):
     asked.save(tmp_path / "branch.nc")
     with xarray.open_dataset(tmp_path / "branch.nc", engine="h5netcdf") as data:
         assert data["zone_r_end"].dims == ("zone",)
-        columns = (data[f"zone_{name}"].values.tolist() for name in table.ZONE_COLUMNS)
+        columns = (data[f"zone_{name}"].values.tolist() for name in ZONE_COLUMNS)
         assert list(zip(*columns, strict=True)) == zone_numbers(asked)
         for name in (n for n in map(str, data.variables) if n.startswith(("zone", "fraction"))):
             assert data[name].attrs["units"] == "1"
@@ -393,7 +394,7 @@ def test_stale_files_go(asked, tmp_path):
     names = {path.name for path in output.write_run(asked, tmp_path)}
     assert {"zones.csv", "zones.png"} <= names
     output.write_run(dataclasses.replace(asked, equilibria=()), tmp_path)
-    assert (tmp_path / "zones.csv").read_text() == ",".join(table.ZONE_COLUMNS) + "\n"
+    assert (tmp_path / "zones.csv").read_text() == ",".join(ZONE_COLUMNS) + "\n"
     assert not (tmp_path / "zones.png").exists()
     output.write_run(dataclasses.replace(asked, scene=asked.scene.replace(analysis=fm.Analysis()), equilibria=()), tmp_path)
     assert not (tmp_path / "zones.csv").exists()

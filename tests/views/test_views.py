@@ -232,7 +232,7 @@ def test_azimuthal_instability_is_a_band(branch: Branch) -> None:
     equilibria = []
     for k, equilibrium in enumerate(branch):
         verdict = Verdict(k < 2, 1.5 - k, 1e-9, None, 1, 0, "")
-        equilibria.append(dataclasses.replace(equilibrium, scene=scene, _verdicts={(None, 1): verdict}))
+        equilibria.append(dataclasses.replace(equilibrium, scene=scene, _answers={("verdict", None, 1): verdict}))
     figure = plots.plot_pressure_volume(dataclasses.replace(branch, scene=scene, equilibria=tuple(equilibria)))
     (band,) = (line for line in figure.axes[0].lines if line.get_label() == "unstable to azimuthal n = 1")
     assert band.get_xydata()[:, 0].tolist() == [(branch[1].volume + branch[2].volume) / 2, branch[2].volume, branch[3].volume]
@@ -250,8 +250,8 @@ def test_special_points_have_distinct_markers(branch: Branch) -> None:
 def judged(equilibrium: Equilibrium, pressure: bool, volume: bool) -> Equilibrium:
     """The equilibrium with verdicts made up."""
     words = {"pressure": pressure, "volume": volume}
-    verdicts = {(c, 0): Verdict(stable, 1.0 if stable else -1.0, 1e-9, c, 0, 0, "") for c, stable in words.items()}
-    return dataclasses.replace(equilibrium, _verdicts=verdicts)
+    verdicts = {("verdict", c, 0): Verdict(stable, 1.0 if stable else -1.0, 1e-9, c, 0, 0, "") for c, stable in words.items()}
+    return dataclasses.replace(equilibrium, _answers=verdicts)
 
 
 def test_two_special_points_between_neighbours(branch: Branch) -> None:
@@ -332,7 +332,7 @@ def test_profiles(branch: Branch, tmp_path: Path) -> None:
 def wrinkled(branch: Branch, criterion: str | None = "total") -> Branch:
     """The branch beside a dipole that compresses the flattest membrane around its pole; stresses need no balance."""
     scene = branch.scene.replace(sources=[Dipole(strength=150, height=4.5)], analysis=Analysis(("volume",), wrinkling=criterion))
-    equilibria = tuple(judged(dataclasses.replace(e, scene=scene, _zones={}), True, True) for e in branch)
+    equilibria = tuple(judged(dataclasses.replace(e, scene=scene, _answers={}), True, True) for e in branch)
     return dataclasses.replace(branch, scene=scene, equilibria=equilibria)
 
 

@@ -1,0 +1,26 @@
+"""The pressure in Pa, of a scene with scales."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from .base import Cell, EquilibriumAnalysis
+
+if TYPE_CHECKING:
+    from ...scene import Scene
+    from ..records import Equilibrium
+
+
+class Pascals(EquilibriumAnalysis):
+    """The pressure in Pa; a scene asks for it by its table [scales]."""
+
+    def asked(self, scene: Scene) -> bool:
+        return scene.scales is not None
+
+    def columns(self, scene: Scene) -> Sequence[str]:
+        return ("pressure_pa",)
+
+    def value(self, equilibrium: Equilibrium, column: str) -> Cell:
+        scales = equilibrium.scene.scales
+        return float("nan") if scales is None else float(scales.to_si("pressure", equilibrium.pressure))

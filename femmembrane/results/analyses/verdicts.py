@@ -1,0 +1,193 @@
+"""Verdicts on stability: the keys ``stability`` and ``azimuthal_modes`` of [analysis]."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...scene import VERDICTS, Perturbations
+from .. import door
+from ..quantities import Quantity, typed
+from ..verdict import Verdict
+from .base import Array, Cell, Curves, EquilibriumAnalysis, PrintedColumn, Remark, Section, Table, Variable
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ...potential import Evaluation
+    from ...scene import Scene
+    from ..records import Branch, Equilibrium
+
+#: controls whose verdicts are printed of a scene that asks for none
+_PRINTED = ("pressure", "volume")
+_COLUMN = re.compile(rf"(lambda|verdict)_(?:({'|'.join(VERDICTS)})|n([1-9]\d*))")
+_STABLE = {"stable": True, "unstable": False, "marginal": None}
+#: in place of a number of negative directions that was not determined
+_UNCOUNTED = -1
+#: what the variables of a verdict mean; their names go on with the tag of the perturbations
+_MEANINGS = {
+    "lambda_error": Quantity("bound on the algebraic error of the smallest eigenvalue"),
+    "lambda": Quantity("smallest eigenvalue, omega^2 rho_m R0^2/mu"),
+    "verdict": Quantity("stability", type=str),
+    "negative_directions": Quantity(f"number of negative eigenvalues ({_UNCOUNTED}: not counted)", type=int),
+    "reason": Quantity("reason of the verdict", type=str),
+    "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
+}
+
+
+class Verdicts(EquilibriumAnalysis):
+    """The verdicts in ``scene.analysis.verdicts``, with smallest eigenvalues and modes."""
+
+    def asked(self, scene: Scene) -> bool:
+        return bool(scene.analysis.verdicts)
+
+    def compute(self, equilibrium: Equilibrium, before: Equilibrium | None, evaluation: Evaluation) -> None:
+        """Started from the modes of the equilibrium before, with the factors that the evaluation has."""
+        potential, state = evaluation.potential, (equilibrium.state, equilibrium.pressure, evaluation)
+        for p in equilibrium.scene.analysis.verdicts:
+            guess = None if before is None else _verdict(before, p).coefficients
+            ask = partial(door.checked_verdict, potential, *state, p.control, p.azimuthal, guess=guess)
+            equilibrium.remembered(("verdict", p.control, p.azimuthal), ask)
+
+    # --- tables
+
+    def columns(self, scene: Scene) -> Sequence[str]:
+        controls = [control for control in VERDICTS if control in scene.analysis.stability]
+        waves = (f"lambda_{p.tag}" for p in scene.analysis.verdicts if p.azimuthal)
+        return (*(f"lambda_{c}" for c in controls), *(f"verdict_{c}" for c in controls), *waves)
+
+    def more_columns(self) -> Sequence[str]:
+        """Those against perturbations of any number of waves are not listed."""
+        return tuple(f"{kind}_{control}" for kind in ("lambda", "verdict") for control in VERDICTS)
+
+    def knows(self, column: str) -> bool:
+        return _COLUMN.fullmatch(column) is not None
+
+    def value(self, equilibrium: Equilibrium, column: str) -> Cell:
+        kind, control, waves = _COLUMN.fullmatch(column).groups()  # type: ignore[union-attr]
+        verdict = _verdict(equilibrium, Perturbations(control, int(waves or 0)))
+        return verdict.word if kind == "verdict" else float(verdict.smallest_eigenvalue)
+
+    def point_columns(self, scene: Scene) -> Sequence[str]:
+        return ("azimuthal",) if scene.analysis.azimuthal_modes else ()
+
+    def quantity(self, name: str) -> Quantity | None:
+        kind = next((k for k in _MEANINGS if name.startswith(k + "_")), None)
+        if kind is None:
+            return None
+        tag, _, part = name.removeprefix(kind + "_").partition("_")
+        against = f"azimuthal mode n = {tag[1:]}" if tag[1:].isdigit() else f"axisymmetric shapes under {tag} control"
+        known = _MEANINGS[kind]
+        return Quantity(f"{known.meaning}, {against}" + (f": {part}" if part else ""), type=known.type)
+
+    # --- files
+
+    def variables(self, branch: Branch) -> Mapping[str, Variable]:
+        found: dict[str, Variable] = {}
+        for p in branch.scene.analysis.verdicts:
+            found |= _variables(p.tag, [_verdict(equilibrium, p) for equilibrium in branch])
+        return found
+
+    def restore(self, dataset: xarray.Dataset, branch: Branch) -> None:
+        """Modes included, to the last bit: eigenvalues found again from other guesses would differ in their last digits."""
+        for p in branch.scene.analysis.verdicts:
+            for equilibrium, verdict in zip(branch, _stored(dataset, p), strict=True):
+                equilibrium.remember(("verdict", p.control, p.azimuthal), verdict)
+
+    # --- words and pages
+
+    def remarks(self, equilibrium: Equilibrium) -> Iterator[Remark]:
+        for p in equilibrium.scene.analysis.verdicts:
+            verdict = _verdict(equilibrium, p)
+            caption = "" if p.azimuthal else f"{verdict.word} {p.against}"
+            yield Remark(p.against, verdict.reason, f"{p.brief}: {verdict.word}", caption)
+
+    def printed(self, scene: Scene) -> Sequence[PrintedColumn]:
+        """Of the controls that the scene asks for; of both where it asks for none."""
+
+        def word(control: str, equilibrium: Equilibrium) -> str:
+            return equilibrium.verdict(control).word
+
+        return [PrintedColumn(f"under {c}", partial(word, c), 14) for c in scene.analysis.stability or _PRINTED]
+
+    def section(self, branch: Branch) -> Section:
+        rows, last, curves = [], [], {}
+        for p in branch.scene.analysis.verdicts:
+            verdicts = [_verdict(equilibrium, p) for equilibrium in branch]
+            for word, steps in stretches([v.word for v in verdicts]):
+                span = str(steps[0]) if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
+                rows.append([p.words, word, span, *(_span(branch.column(c)[steps]) for c in ("volume", "pressure"))])
+            last.append(Remark(p.words, verdicts[-1].reason))
+            curves[f"λ, {p.held}"] = branch.column(f"lambda_{p.tag}")
+        figure = Curves("Smallest eigenvalues along the branch", "smallest eigenvalue λ", curves)
+        return Section("Verdicts", figure, Table(["against", "verdict", "steps", "V", "P"], rows), last)
+
+
+def stretches(words: Sequence[str]) -> Iterator[tuple[str, list[int]]]:
+    """Stretches of steps with the same word."""
+    for word, steps in groupby(range(len(words)), key=words.__getitem__):
+        yield word, list(steps)
+
+
+def _span(values: Array) -> str:
+    low, high = f"{values.min():.5g}", f"{values.max():.5g}"
+    return (low if low == high else f"{low} … {high}").replace("-", "−")  # noqa: RUF001
+
+
+def _verdict(equilibrium: Equilibrium, against: Perturbations) -> Verdict:
+    return equilibrium.verdict(against.control, azimuthal=against.azimuthal)
+
+
+def _variables(tag: str, verdicts: Sequence[Verdict]) -> dict[str, Variable]:
+    """All of the verdicts of one class that the columns leave out, and :func:`_stored` needs to build them again."""
+    numbers: dict[str, Sequence[Any]] = {
+        f"verdict_{tag}": [v.word for v in verdicts],
+        f"lambda_error_{tag}": [v.error for v in verdicts],
+        f"negative_directions_{tag}": [_UNCOUNTED if v.negative_directions is None else v.negative_directions for v in verdicts],
+        f"reason_{tag}": [v.reason for v in verdicts],
+    }
+    variables: dict[str, Variable] = {name: (("step",), typed(name, values)) for name, values in numbers.items()}
+    shapes = [_shape(v) for v in verdicts]
+    for key, known in next((s for s in shapes if s), {}).items():
+        dimension = f"coefficient_{tag}" if key == "coefficients" else "node"
+        variables[f"mode_{tag}_{key}"] = (("step", dimension), np.array([s.get(key, np.full_like(known, np.nan)) for s in shapes]))
+    return variables
+
+
+def _shape(verdict: Verdict) -> dict[str, Array]:
+    """The mode of a verdict by component, empty without a mode; its radii are those of the profile's nodes."""
+    mode = verdict.mode
+    if mode is None or verdict.coefficients is None:
+        return {}
+    return {**{key: values for key, values in mode.items() if key != "r"}, "coefficients": verdict.coefficients}
+
+
+def _stored(dataset: xarray.Dataset, against: Perturbations) -> Iterator[Verdict]:
+    prefix, tag = f"mode_{against.tag}_", against.tag
+    parts = {str(name).removeprefix(prefix): v.values for name, v in dataset.items() if str(name).startswith(prefix)}
+    for k in range(dataset.sizes["step"]):
+        mode = {"r": dataset["r"].values, **{key: values[k] for key, values in parts.items()}}
+        coefficients = mode.pop("coefficients", None)
+        known = coefficients is not None and not np.isnan(coefficients).any()
+        count = int(dataset[f"negative_directions_{tag}"].values[k])
+        yield Verdict(
+            stable=_STABLE[str(dataset[f"verdict_{tag}"].values[k])],
+            smallest_eigenvalue=float(dataset[f"lambda_{tag}"].values[k]),
+            error=float(dataset[f"lambda_error_{tag}"].values[k]),
+            control=against.control,
+            azimuthal=against.azimuthal,
+            negative_directions=None if count == _UNCOUNTED else count,
+            reason=str(dataset[f"reason_{tag}"].values[k]),
+            coefficients=coefficients if known else None,
+            _shape=partial(_stored_shape, mode) if known else None,
+        )
+
+
+def _stored_shape(mode: Mapping[str, Array], _: Array) -> Mapping[str, Array]:
+    """In place of the function that finds the shape of a mode from its coefficients: the shape that was found."""
+    return mode

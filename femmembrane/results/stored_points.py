@@ -1,0 +1,173 @@
+"""Equilibria, special points, snaps and the memory of a path as variables of a data set, and back.
+
+Functions that end in ``_variables`` answer the variables by their names, with dimensions and values; those that end in ``_of`` build the
+records again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Status
+from .analyses.base import Variable
+from .quantities import typed
+from .records import Equilibrium, Jump, PathMemory, SpecialPoint, TraceMemory
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..scene import Scene
+
+Array = NDArray[np.float64]
+
+_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "load_energy", "residual", "seconds")
+_SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
+#: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
+SPECIAL, LIMIT = "special_", "limit_"
+
+
+def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, Variable]:
+    """What :func:`equilibria_of` needs to build the records again; ``width`` is the length of their states."""
+    absent = {
+        name
+        for name, kind in (("magnetic_energy", "sources"), ("load_energy", "loads"))
+        if not any(getattr(e.scene, kind) for e in equilibria)
+    }
+    scalars = [name for name in _SCALARS if name not in absent]
+    return {
+        **{prefix + name: ((dimension,), typed(name, (getattr(e, name) for e in equilibria))) for name in scalars},
+        prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
+        prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
+        prefix + "state": ((dimension, "coefficient"), np.array([e.state for e in equilibria]).reshape(len(equilibria), width)),
+    }
+
+
+def equilibria_of(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> list[Equilibrium]:
+    """The equilibria of a scene; ``prefix`` is that of their variables."""
+    count = len(dataset[prefix + "status"])
+    states = _finite(dataset, prefix + "state", count, _unknowns(scene) if count else dataset.sizes["coefficient"])
+    states.flags.writeable = False
+    present = {"magnetic_energy": bool(scene.sources), "load_energy": bool(scene.loads)}
+    needed = [name for name in _SCALARS if (count and present.get(name, True)) or prefix + name in dataset]
+    scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
+    scalars.setdefault("magnetic_energy", [0.0] * count)
+    return [
+        Equilibrium(
+            **{name: values[k] for name, values in scalars.items()},
+            iterations=int(dataset[prefix + "iterations"].values[k]),
+            status=Status(str(dataset[prefix + "status"].values[k])),
+            scene=scene,
+            state=states[k],
+        )
+        for k in range(count)
+    ]
+
+
+def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, Variable]:
+    """What :func:`special_points_of` needs to build the records again, their equilibria included."""
+    dimension = prefix + "point"
+    numbers = {prefix + name: ((dimension,), typed(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
+    kinds: dict[str, Variable] = {prefix + "kind": ((dimension,), typed("kind", (str(p.kind) for p in points)))}
+    tangents: dict[str, Variable] = {}
+    if any(p.tangent is not None for p in points):
+        none = np.full(width + 1, np.nan)
+        tangents[prefix + "tangent"] = (dimension, "unknown"), np.array([none if p.tangent is None else p.tangent for p in points])
+    states = equilibrium_variables([p.equilibrium for p in points], width, dimension, prefix + "equilibrium_")
+    return {**kinds, **numbers, **tangents, **states}
+
+
+def special_points_of(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple[SpecialPoint, ...] | None:
+    """The special points, None where none were looked for."""
+    if prefix + "kind" not in dataset:
+        return None
+    kinds = [str(k) for k in dataset[prefix + "kind"].values]
+    numbers = zip(*(dataset[prefix + name].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
+    states = equilibria_of(dataset, scene, prefix + "equilibrium_")
+    # younger than the format, and only where there are branch points
+    tangents: list[Array | None] = [None] * len(kinds)
+    if prefix + "tangent" in dataset:
+        rows = np.array(dataset[prefix + "tangent"].values, dtype=np.float64)
+        tangents = [row if np.isfinite(row).all() else None for row in rows]
+    return tuple(
+        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, tangent=t)
+        for k, n, e, t in zip(kinds, numbers, states, tangents, strict=True)
+    )
+
+
+def memory_variables(memory: PathMemory | None) -> dict[str, Variable]:
+    """The path that predicts the next equilibrium."""
+    if memory is None:
+        return {}
+    return {
+        "trace_sigma": (("trace",), np.array(memory.sigma)),
+        "trace_point": (("trace", "unknown"), memory.points),
+        "trace_slope": (("trace", "unknown"), memory.slopes),
+    }
+
+
+def memory_of(dataset: xarray.Dataset) -> PathMemory | None:
+    """The path that predicts the next equilibrium, None where none was kept."""
+    if "trace_sigma" not in dataset:
+        return None
+    sigma = _finite(dataset, "trace_sigma", dataset.sizes["trace"])
+    shape = len(sigma), dataset.sizes["coefficient"] + 1
+    points, slopes = (_finite(dataset, name, *shape) for name in ("trace_point", "trace_slope"))
+    if "trace_step" not in dataset.attrs:
+        return PathMemory(tuple(sigma.tolist()), points, slopes)
+    unexplained = tuple(map(str, json.loads(dataset.attrs.get("trace_unexplained", "[]"))))
+    step, regular = float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"])
+    if not (len(sigma) and 0 < step < np.inf and 1 <= regular <= dataset.sizes["step"]):
+        raise ValueError("the memory of the trace does not belong to it")
+    known = float(dataset.attrs.get("trace_known", 0.0))
+    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained, known)
+
+
+def memory_attributes(memory: PathMemory | None) -> dict[str, Any]:
+    """What a trace remembers beside the points of its path."""
+    if not isinstance(memory, TraceMemory):
+        return {}
+    unexplained = {"trace_unexplained": json.dumps(memory.unexplained)} if memory.unexplained else {}
+    return {"trace_step": memory.step, "trace_regular": memory.regular, "trace_known": memory.known, **unexplained}
+
+
+def jump_variables(jumps: Sequence[Jump], width: int) -> dict[str, Variable]:
+    """Where a run snapped, and the folds before."""
+    if not jumps:
+        return {}
+    limits = [jump.limit for jump in jumps if jump.limit is not None]
+    return {
+        "jump_index": (("jump",), typed("jump_index", (jump.index for jump in jumps))),
+        "jump_limit": (("jump",), typed("jump_limit", (jump.limit is not None for jump in jumps))),
+        **special_variables(limits, width, LIMIT),
+    }
+
+
+def jumps_of(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:
+    """Where a run snapped."""
+    if "jump_index" not in dataset:
+        return ()
+    limits = iter(special_points_of(dataset, scene, LIMIT) or ())
+    located = list(zip(dataset["jump_index"].values.tolist(), dataset["jump_limit"].values.tolist(), strict=True))
+    if not all(0 <= index < len(equilibria) for index, _ in located):
+        raise ValueError("a snap lands on no equilibrium")
+    return tuple(Jump(index, next(limits) if known else None, equilibria[index]) for index, known in located)
+
+
+def _finite(dataset: xarray.Dataset, name: str, *shape: int) -> Array:
+    """The values of a variable, which must be numbers in this shape."""
+    values = dataset[name].values
+    if values.shape != shape or values.dtype.kind != "f" or not np.isfinite(values).all():
+        raise ValueError(f"{name} are no {' x '.join(map(str, shape))} finite numbers")
+    return np.array(values, dtype=np.float64)
+
+
+def _unknowns(scene: Scene) -> int:
+    """The number of unknowns of the states of a scene."""
+    from ..discretization.space import space_of_scene
+
+    return int(space_of_scene(scene).n_free)

@@ -376,7 +376,7 @@ def spread(loads: ArrayLike) -> list[int]:
 
 def _misses(space: Space, x: Array) -> Array:
     """What elements of the grading degree miss in each element: the integral of the squared slopes of the difference, relative to all."""
-    low = space_of(space.mesh, _GRADING_DEGREE)
+    low = space_of(space.mesh, _GRADING_DEGREE, ends=tuple(space.ends))
     missed = x - transferred(low, transferred(space, x, low), space)
 
     def slopes(y: Array) -> Array:

@@ -29,6 +29,8 @@ class Numbering:
     anchored : frozenset of {"along", "shift", "tilt"}
         Rigid motions that something outside, such as a magnetic source, sees: along the axis, across it, and about a diameter. They are
         not free, and nothing is pinned for them.
+    ends : tuple of float
+        Places along the meridian at which elements end beside the breakpoints of the mesh: where the sheet has a jump.
 
     Attributes
     ----------
@@ -83,9 +85,16 @@ class Numbering:
         2 pi times the quadrature weight on the reference element.
     """
 
-    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
+    def __init__(
+        self,
+        mesh: Meridian,
+        degree: int,
+        quadrature: int | None = None,
+        anchored: frozenset[str] = frozenset(),
+        ends: tuple[float, ...] = (),
+    ) -> None:
         self.mesh, self.degree, self.anchored, self.side = mesh, degree, anchored, side(mesh)
-        self.ends: Array = mesh.breakpoints()
+        self.ends: Array = with_ends(mesh.breakpoints(), ends)
         self.sizes: Array = np.diff(self.ends)
         line = skfem.MeshLine(self.ends)
         element = line_element(degree)
@@ -247,6 +256,14 @@ class Numbering:
         s = np.asarray(s, dtype=float)
         element = np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, self.n_elements - 1)
         return element, (s - self.ends[element]) / self.sizes[element]
+
+
+def with_ends(breakpoints: Array, further: tuple[float, ...]) -> Array:
+    """Element ends with further ones between them; one that is an end already, to round-off, makes no element of its own."""
+    first, last = breakpoints[0], breakpoints[-1]
+    near = LEAST_LENGTH * (last - first) + 1e-9 * np.diff(breakpoints).min()
+    new = [s for s in sorted(set(further)) if first < s < last and np.abs(breakpoints - s).min() > near]
+    return np.sort(np.append(breakpoints, new)) if new else breakpoints
 
 
 def band_of(gather: NDArray[np.int64], n_free: int) -> int:

@@ -45,8 +45,15 @@ class Space(Numbering):
         The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
     """
 
-    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
-        super().__init__(mesh, degree, quadrature, anchored)
+    def __init__(
+        self,
+        mesh: Meridian,
+        degree: int,
+        quadrature: int | None = None,
+        anchored: frozenset[str] = frozenset(),
+        ends: tuple[float, ...] = (),
+    ) -> None:
+        super().__init__(mesh, degree, quadrature, anchored, ends)
         self._tabulate()
 
     def _tabulate(self) -> None:
@@ -160,9 +167,9 @@ class Space(Numbering):
         matrix = sparse.csc_matrix((v[nonzero], (r[nonzero], c[nonzero])), shape=(pattern.size, 10 * self.s.size))
         return pattern % self.n_free, pattern // self.n_free, matrix
 
-    def mass_band(self) -> Array:
-        """Mass matrix Int phi.phi 2 pi R dS of the reference area, in band storage."""
-        area = self.weights * self.R * np.hypot(self.R_x, self.Z_x)
+    def mass_band(self, area: Array | None = None) -> Array:
+        """Mass matrix Int phi.phi 2 pi R dS of the reference area, or of what ``area`` has at the points, in band storage."""
+        area = self.area_weights if area is None else area
         density = np.zeros((len(HESSIAN_PAIRS), *area.shape))
         density[HESSIAN_PAIRS.index((0, 0))] = density[HESSIAN_PAIRS.index((2, 2))] = area
         return self.assemble_band(density.reshape(-1, self.n_elements))
@@ -292,14 +299,14 @@ class Space(Numbering):
 
 
 @lru_cache(maxsize=32)
-def space_of(mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset()) -> Space:
+def space_of(mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset(), ends: tuple[float, ...] = ()) -> Space:
     """The space of a mesh and a degree, built once."""
-    return Space(mesh, degree, anchored=anchored)
+    return Space(mesh, degree, anchored=anchored, ends=ends)
 
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return space_of(scene.mesh, scene.degree, anchored(scene))
+    return space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends)
 
 
 def anchored(scene: Any) -> frozenset[str]:

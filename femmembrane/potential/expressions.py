@@ -60,8 +60,13 @@ def point_expressions(
     u, u_x, w, w_x = (local[k] for k in range(4))
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
+    if "thickness" in columns:
+        area = area * data[columns.index("thickness")]  # all that is integrated over it belongs to the bulk of the sheet
     material = strain_energy(scene.material, scene.tension_field)
     stress, tangent = response_expressions(material, ca.vertcat(e1, e2))
+    modulus = data[columns.index("modulus")] if "modulus" in columns else None
+    if modulus is not None:
+        stress, tangent = modulus * stress, modulus * tangent
     # the chain rule through closed-form stresses keeps the digits that differentiating the energy would lose at small strain, and
     # written out it takes half the operations of differentiating the composition
     slopes = ca.jacobian(ca.vertcat(e1, e2), local)
@@ -89,7 +94,7 @@ def point_expressions(
         second, first = ca.hessian(load, local)
         gradient, hessian = gradient + first, hessian + second
     return (data, local, parameters), {
-        "elastic": area * material.energy(e1, e2),
+        "elastic": (area if modulus is None else area * modulus) * material.energy(e1, e2),
         "magnetic": magnetic,
         "load": load,
         "volume": volume,

@@ -19,6 +19,7 @@ from ..kernels import kernels
 from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
+from ..physics.sheet import Sheet
 from ..physics.tension_field import strain_energy
 from ..threads import cached_property
 from .expressions import BUILDING, casadi_answers_numpy, point_expressions, point_rows, response_expressions
@@ -123,8 +124,14 @@ class Potential:
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        self.space = space_of(scene.mesh, scene.degree, fixed) if quadrature is None else Space(scene.mesh, scene.degree, quadrature, fixed)
+        ends = scene.element_ends
+        self.space = (
+            space_of(scene.mesh, scene.degree, fixed, ends)
+            if quadrature is None
+            else Space(scene.mesh, scene.degree, quadrature, fixed, ends)
+        )
         space = self.space
+        self.sheet = Sheet.of(scene)
         if not space.n_free:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
@@ -145,6 +152,8 @@ class Potential:
             columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
         if forces is not None:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
+        if self.sheet is not None:
+            columns |= self.sheet.columns(space.R, space.Z, space.s)
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with casadi_answers_numpy():
             self.symbols, self.terms = point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
@@ -162,14 +171,21 @@ class Potential:
         return strain_energy(self.scene.material, self.scene.tension_field)
 
     @cached_property
-    def mass(self) -> Array:
-        """Mass matrix of the reference area in band storage, shape (3 kd + 1, n_free)."""
-        return self.space.mass_band()
+    def bulk(self) -> Array:
+        """Weights of the integral of the thickness over the reference area, with the 2 pi, shape (n_quadrature, n_elements)."""
+        space = self.space
+        thickness = 1.0 if self.sheet is None else self.sheet.factors(space.R, space.Z, space.s)[0]
+        return space.area_weights if np.isscalar(thickness) else space.area_weights * thickness
 
-    @property
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrix of the membrane, over that of its reference area, in band storage, shape (3 kd + 1, n_free)."""
+        return self.space.mass_band(self.bulk)
+
+    @cached_property
     def area(self) -> float:
-        """Reference area of the membrane."""
-        return self.space.reference_area
+        """Reference area of the membrane, of an uneven one times its thickness."""
+        return float(self.bulk.sum())
 
     @cached_property
     def rigid(self) -> Array | None:
@@ -178,7 +194,7 @@ class Potential:
         if space.pin is None:
             return None
         density = np.zeros((4, *space.R.shape))
-        density[2] = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        density[2] = self.bulk
         return space.assemble_vector(density.reshape(-1, space.n_elements))[:, None] / np.sqrt(self.area)
 
     @cached_property
@@ -269,7 +285,7 @@ class Potential:
         return self.elements.force_scale(evaluation.force_density, pressure)
 
     def response(self, e1: Array, e2: Array) -> Array:
-        """Principal mechanical stresses and their derivatives with respect to the Hencky strains.
+        """Principal mechanical stresses and their derivatives with respect to the Hencky strains, where the modulus is 1.
 
         Returns
         -------
@@ -292,7 +308,7 @@ class Potential:
         Returns
         -------
         ndarray, shape (6, n)
-            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources and loads.
+            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T, where the thickness is 1; zeros without sources and loads.
         """
         if not self.surrounded:
             return np.zeros((6, np.size(rho)))

@@ -18,6 +18,7 @@ from ..discretization.meridian import Meridian, disc
 from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
+from ..physics.along import Along
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source, distance_to_polyline
 from ..physics.materials import Material
@@ -65,6 +66,9 @@ class Scene:
         Physical size and stiffness: stresses and pressures are then given in Pa as well. They change no equilibrium.
     loads : sequence of Load
         Loads besides the pressure, such as ``Hydrostatic(gamma=...)``; none: nothing of them is built.
+    thickness, modulus : float, str, table or callable, optional
+        Thickness over T and shear modulus over mu along the meridian, each a factor > 0: a number, an expression such as
+        ``"1 - 0.4*R**2"``, a table of (s, factor), or a function of (R, Z, s) (:mod:`~femmembrane.physics.along`). Left out: 1.
 
     Raises
     ------
@@ -85,6 +89,8 @@ class Scene:
     analysis: Analysis = field(default_factory=Analysis)
     scales: Scales | None = None
     loads: tuple[Load, ...] = ()
+    thickness: Any = None
+    modulus: Any = None
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -113,8 +119,11 @@ class Scene:
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=switch("effects.tension_field", self.tension_field),
             title=_text("title", self.title),
+            thickness=Along.of("membrane.thickness", self.thickness),
+            modulus=Along.of("membrane.modulus", self.modulus),
         )
         self._check_size()
+        self._check_sheet()
         self._check_sources()
         self._check_hubs()
 
@@ -132,6 +141,16 @@ class Scene:
         kept = 8 * (_PROFILES + 2) * count * degree + _BYTES_STEP
         if steps * kept > SMALL:
             require("run.steps" if run is not None and run.values is None else "run.values", steps, kept, "equilibria on this mesh")
+
+    def _check_sheet(self) -> None:
+        if self.thickness is None and self.modulus is None:
+            return
+        ends = self.mesh.breakpoints()
+        s = np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+        for key in ("thickness", "modulus"):
+            factor = getattr(self, key)
+            if factor is not None:
+                factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
 
     def _check_sources(self) -> None:
         R, Z = self.mesh.position(self.mesh.breakpoints())
@@ -172,6 +191,11 @@ class Scene:
     def open(self) -> bool:
         """Whether the elements are still to be chosen, for the accuracy that is asked for: nothing can be computed before."""
         return bool(getattr(self.mesh, "open", False))
+
+    @property
+    def element_ends(self) -> tuple[float, ...]:
+        """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet."""
+        return tuple(sorted({s for factor in (self.thickness, self.modulus) if factor is not None for s in factor.ends}))
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.

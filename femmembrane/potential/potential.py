@@ -22,7 +22,7 @@ from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
 from ..physics.sheet import Sheet
 from ..physics.tension_field import strain_energy
 from ..threads import cached_property
-from .expressions import BUILDING, casadi_answers_numpy, point_expressions, point_rows, response_expressions
+from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .replay import PointProgram, Replay, at_points
 
 if TYPE_CHECKING:
@@ -124,11 +124,11 @@ class Potential:
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        ends = scene.element_ends
+        ends, stretch = scene.element_ends, scene.prestretch
         self.space = (
-            space_of(scene.mesh, scene.degree, fixed, ends)
+            space_of(scene.mesh, scene.degree, fixed, ends, stretch)
             if quadrature is None
-            else Space(scene.mesh, scene.degree, quadrature, fixed, ends)
+            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch)
         )
         space = self.space
         self.sheet = Sheet.of(scene)
@@ -154,6 +154,8 @@ class Potential:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
         if self.sheet is not None:
             columns |= self.sheet.columns(space.R, space.Z, space.s)
+        if space.lift is not None:
+            columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with casadi_answers_numpy():
             self.symbols, self.terms = point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
@@ -251,7 +253,7 @@ class Potential:
             return np.inf
         space = self.space
         u, _, w, _ = self.elements.at_quadrature(np.ascontiguousarray(x)).reshape(4, *space.R.shape)
-        rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
+        rho, eta, poles = space.lifted[0] + u, space.lifted[2] + w, space.axis_heights(x)
         square = [s.distance_squared(rho, eta).min() for s in self.sources]
         # a source all along the axis runs through hubs, and through a pole nowhere (a scene refuses it)
         square += [s.distance_squared(0.0, pole) for s in self.sources if "along" in s.sees for pole in poles]
@@ -273,7 +275,7 @@ class Potential:
     def _meridian(self, x: Array) -> Array:
         """Positions (rho, eta) of the nodes, shape (2, n)."""
         s = self.space.node_parameters()
-        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.evaluate(x, s)
+        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.displacement(x, s)
         return np.stack([R + u, Z + w])
 
     def largest(self, x: Array) -> tuple[float, float]:

@@ -81,7 +81,7 @@ SHAPES: dict[str, Any] = {
 #: keys of [mesh] beside the file that holds the meridian
 FILE_KEYS = ("group", "divisions", "first", "last")
 SCENE_KEYS: dict[str, tuple[str, ...]] = {
-    "membrane": ("susceptibility", "radius_to_thickness", "thickness", "modulus"),
+    "membrane": ("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
     "mesh": ("degree",),
     "effects": ("tension_field",),
 }
@@ -191,6 +191,8 @@ def tables_of(scene: Scene) -> dict[str, Any]:
                 f"membrane.{name}", getattr(scene, name).given, "a function has no name in scene files; an expression or a table has"
             )
     tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
+    if scene.prestretch == 1:
+        del tables["membrane"]["prestretch"]
     if scene.scales:  # which hold it already
         del tables["membrane"]["radius_to_thickness"]
     if scene.run and scene.run.control != "arc-length":
@@ -289,7 +291,9 @@ def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any)
 
 
 def _arguments(value: Any) -> dict[str, Any]:
-    return {f.name: getattr(value, f.name) for f in fields(value)}
+    found = {f.name: getattr(value, f.name) for f in fields(value)}
+    quiet = {f.name for f in fields(value) if f.metadata.get("quiet") and found[f.name] == f.default}  # newer than files that lack it
+    return {name: part for name, part in found.items() if name not in quiet}
 
 
 def _plain(value: Any) -> Any:

@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..checks import number, sequence, store, switch, whole
+from ..discretization.lift import lift_of
 from ..discretization.meridian import Meridian, disc
 from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
@@ -28,6 +29,8 @@ from .run import Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 
 MAX_DEGREE = 8
+#: largest pre-stretch: its sixth power is still a number beside 1
+MAX_STRETCH = 1e6
 #: characters of a title
 MAX_TEXT = 1000
 #: bytes that a computation takes for each element and degree at least, measured on 20000 elements: by Newton's method, and by IPOPT
@@ -69,6 +72,9 @@ class Scene:
     thickness, modulus : float, str, table or callable, optional
         Thickness over T and shear modulus over mu along the meridian, each a factor > 0: a number, an expression such as
         ``"1 - 0.4*R**2"``, a table of (s, factor), or a function of (R, Z, s) (:mod:`~femmembrane.physics.along`). Left out: 1.
+    prestretch : float
+        How far the membrane is stretched before anything else acts: the rim of a flat disc or annulus is held at so many times its radius,
+        the ends of a tube at so many times their height. P, V and lengths stay in units of the reference R0.
 
     Raises
     ------
@@ -91,6 +97,7 @@ class Scene:
     loads: tuple[Load, ...] = ()
     thickness: Any = None
     modulus: Any = None
+    prestretch: float = 1.0
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -121,9 +128,11 @@ class Scene:
             title=_text("title", self.title),
             thickness=Along.of("membrane.thickness", self.thickness),
             modulus=Along.of("membrane.modulus", self.modulus),
+            prestretch=_prestretch("membrane.prestretch", self.prestretch),
         )
         self._check_size()
         self._check_sheet()
+        lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
         self._check_sources()
         self._check_hubs()
 
@@ -291,6 +300,10 @@ def _ratio(key: str, value: Any, scales: Scales | None) -> float:
         advice = "leave radius_to_thickness out, and it follows from the scales (Scene.replace does so when it is given other scales)"
         raise InputError(key, value, f"it contradicts {follows}; {advice}")
     return scales.radius_to_thickness
+
+
+def _prestretch(key: str, value: Any) -> float:
+    return number(key, value, "a finite number > 0 is allowed (1: not stretched)", above=0, most=MAX_STRETCH)
 
 
 def _susceptibility(key: str, value: Any) -> float | None:

@@ -126,7 +126,7 @@ class Parameter:
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
-        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "element_ends")
+        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
         return SimpleNamespace(**parts, **{name: getattr(scene, name) for name in kept})
 
     def _check_modulus(self, value: float, alpha: float) -> None:

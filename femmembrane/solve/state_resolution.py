@@ -167,6 +167,6 @@ def _side(potential: Potential, evaluation: Evaluation) -> int:
 def _largest_stretch(potential: Potential, x: Array) -> float:
     """Logarithm of the largest principal stretch at the quadrature points."""
     space = potential.space
-    u, u_x, _, w_x = space.at_quadrature(x).reshape(4, *space.R.shape)
+    u, u_x, _, w_x = space.displacement_at_quadrature(x)
     along = np.hypot(space.R_x + u_x, space.Z_x + w_x) / np.hypot(space.R_x, space.Z_x)
     return float(np.log(max(along.max(), (1 + u / space.R).max())))

@@ -93,7 +93,7 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     density = np.stack(second_variation(space, response, potential.loads, pressure, n))
     band = layout.assemble(density)
     for end in space.free_ends if n else ():
-        rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
+        rho = space.mesh.position(space.ends[[end]])[0] + space.displacement(x, space.ends[[end]])[0]
         i, j = layout.numbers[space.nodes[end], [RADIAL, VERTICAL]]
         work = np.pi * n * pressure * float(rho[0]) * (space.side if end == 0 else -space.side)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole

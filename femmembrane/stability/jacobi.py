@@ -97,7 +97,7 @@ def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
     """
     potential = equilibrium.potential
     space = potential.space
-    displacement = space.at_quadrature(equilibrium.state).reshape(4, space.n_quadrature, -1)
+    displacement = space.displacement_at_quadrature(equilibrium.state)
     response = local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
     smallest = np.minimum(response.W11, response.N1) / 2
     at = int(np.argmin(smallest))
@@ -161,7 +161,7 @@ class _Coefficients:
         angle = np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         size = np.diff(self.ends)
         s = self.ends[:-1, None] + size[:, None] * (1 + np.cos(angle)) / 2
-        mesh, displacement = potential.space.mesh, potential.space.evaluate(x, s.ravel())
+        mesh, displacement = potential.space.mesh, potential.space.displacement(x, s.ravel())
         (R, Z), (R_s, Z_s) = mesh.position(s.ravel()), mesh.tangent(s.ravel())
         samples = self._regular(local_response(potential, (R, R_s, Z, Z_s), displacement, s.ravel())).reshape(-1, *s.shape)
         transform = 2 / _SAMPLES * np.cos(np.arange(_SAMPLES)[:, None] * angle)

@@ -79,7 +79,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     s : ndarray, shape (n,)
     """
     space = space_of_scene(scene)
-    u, own, w, _ = space.evaluate(x, s)
+    u, own, w, _ = space.displacement(x, s)
     u_s, w_s = space.recovered_slopes(x, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
     pole = np.abs(R) <= LEAST_LENGTH * space.size  # there u/R is the limit u_s/R_s

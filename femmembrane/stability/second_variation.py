@@ -176,7 +176,7 @@ def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Arr
 def response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse:
     """Remembered for the other n of the same state."""
     space = potential.space
-    displacement = space.at_quadrature(np.frombuffer(state)).reshape(4, space.n_quadrature, -1)
+    displacement = space.displacement_at_quadrature(np.frombuffer(state))
     return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
 
 

@@ -25,6 +25,13 @@ SUSCEPTIBILITY = 2.5
 
 _TABLES = json.loads((Path(__file__).parent / "data" / "disc.json").read_text(encoding="utf-8"))
 
+_EFFECTS = {table["name"]: table for table in json.loads((Path(__file__).parent / "data" / "effects.json").read_text(encoding="utf-8"))}
+
+
+def effect(name: str) -> list[dict[str, float]]:
+    """The points of one table of data/effects.json."""
+    return list(_EFFECTS[name]["points"])
+
 
 def disc_scene(material: Any = OGDEN, dipole: tuple[float, float] | None = None, elements: int = 64, degree: int = 2) -> fm.Scene:
     """The clamped disc with the paper's susceptibility; ``dipole`` is (strength, height)."""

@@ -129,7 +129,7 @@ def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene,
             found = (branch, shortfall)
         if shortfall is None:
             break
-        finer = follow(_on(scene, Disc(radii=cast(Disc, chosen.mesh).radii)))
+        finer = follow(_on(scene, _disc(chosen, radii=cast(Disc, chosen.mesh).radii)))
         if not len(finer):
             break
         trial = _estimated([finer[k] for k in _checked(finer)], controls, chosen.mesh.elements)
@@ -209,7 +209,7 @@ class _Choice:
         self.degree = int(np.clip(round(1 - np.log10(accuracy) / 2), 2, most))
 
     def candidate(self, elements: int, degree: int) -> Scene:
-        return self.scene.replace(mesh=Disc(radii=graded(*self.density, elements)), degree=degree)
+        return self.scene.replace(mesh=_disc(self.scene, radii=graded(*self.density, elements)), degree=degree)
 
     def error(self, elements: int, degree: int) -> float:
         return self.trial.error_on(self.candidate(elements, degree), self.hardest[:_TRIED])
@@ -223,7 +223,7 @@ class _Choice:
             found = self.candidate(elements, self.degree)
             estimated = self.trial.error_on(found, self.hardest)
             if estimated <= self.target:
-                return found.replace(mesh=Disc(radii=cast(Disc, found.mesh).radii, accuracy=self.accuracy, estimated=estimated))
+                return found.replace(mesh=_disc(found, radii=cast(Disc, found.mesh).radii, accuracy=self.accuracy, estimated=estimated))
             if elements >= _MOST:
                 raise self.not_met(estimated)
             elements = min(elements + 1 + elements // 8, _MOST)
@@ -325,7 +325,7 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
     """The run on the coarsest trial mesh on which its errors can be estimated."""
     controls, trial = _controls(control), None
     for elements in _TRIAL_MESHES:
-        branch = follow(_on(scene, Disc(elements)))
+        branch = follow(_on(scene, _disc(scene, elements=elements)))
         if not len(branch):
             failure = SolveError(branch.message, status=branch.status)
             continue
@@ -374,11 +374,16 @@ def spread(loads: ArrayLike) -> list[int]:
     return sorted({*even, int(np.argmin(loads)), int(np.argmax(loads))})
 
 
+def _disc(scene: Scene, **arguments: Any) -> Disc:
+    """A disc with other elements, its rim held as that of the scene."""
+    return Disc(**arguments, rim=cast(Disc, scene.mesh).rim)
+
+
 def _misses(space: Space, x: Array) -> Array:
     """The part of a state that elements of the grading degree miss, for each element: the integral of the squared slopes of the difference,
     over the sum of all.
     """
-    low = space_of(space.mesh, _GRADING_DEGREE)
+    low = space_of(space.mesh, _GRADING_DEGREE, ends=tuple(space.ends))
     missed = x - transferred(low, transferred(space, x, low), space)
 
     def slopes(y: Array) -> Array:

@@ -26,11 +26,11 @@ def profile_norms(space: Space, x: Array, other: Space | None = None, y: Array |
     size = np.diff(ends)
     s = (ends[:-1, None] + size[:, None] * (points + 1) / 2).ravel()
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
-    u, u_s, w, w_s = space.evaluate(x, s)
     if other is None or y is None:
+        u, u_s, w, w_s = space.displacement(x, s)
         u, w, u_s, w_s = u + R, w + Z, u_s + R_s, w_s + Z_s
     else:
-        u, u_s, w, w_s = (a - b for a, b in zip((u, u_s, w, w_s), other.evaluate(y, s), strict=True))
+        u, u_s, w, w_s = (a - b for a, b in zip(space.evaluate(x, s), other.evaluate(y, s), strict=True))
     slope = np.hypot(R_s, Z_s)
     area = 2 * np.pi * R * slope * (size[:, None] * weights / 2).ravel()
     plain, derivative = float(area @ (u**2 + w**2)), float(area @ ((u_s**2 + w_s**2) / slope**2))

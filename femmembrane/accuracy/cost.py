@@ -203,7 +203,7 @@ class Course:
     def interpolate(self, index: int, potential: Potential) -> Array:
         """The fine state at one of the loads on another mesh."""
         points = potential.space.interpolation_points()
-        u, _, w, _ = self.potential.space.evaluate(self.states[index].x, points.ravel())
+        u, _, w, _ = self.potential.space.displacement(self.states[index].x, points.ravel())
         return potential.space.interpolate(u.reshape(points.shape), w.reshape(points.shape))
 
     def follow(self, potential: Potential, first: State) -> list[State]:

@@ -64,6 +64,9 @@ class StrongForm:
         if scene.tension_field:
             allowed = "false is allowed: shooting and collocation solve the equations of a plain membrane"
             raise InputError("effects.tension_field", True, allowed)
+        for key in ("thickness", "modulus"):
+            if getattr(scene, key) is not None:
+                raise InputError(f"membrane.{key}", getattr(scene, key).given, "an even sheet is allowed here")
         if not isinstance(scene.mesh, Disc):
             raise InputError("mesh.shape", getattr(scene.mesh, "shape", scene.mesh), "the disc is allowed")
         self.material = scene.material

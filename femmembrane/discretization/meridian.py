@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Protocol, Self
 
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ..checks import FINITE, between, is_number, whole
 from ..errors import InputError
-from .supports import Support
+from .supports import CLAMPED, POLE, Held, Support, checked_end, support_of
 
 Array = NDArray[np.float64]
 
@@ -117,6 +117,8 @@ class Disc:
     accuracy : float, optional
         Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all of the above. Until they are
         chosen the mesh is open: it has no elements, and nothing can be computed on it.
+    rim : str or mapping
+        How the rim is held, "clamped", and where if not at radius 1 and height 0: ``{"kind": "clamped", "radius": 1.2, "height": 0.3}``.
     estimated : float, optional
         The relative error that was estimated when the mesh was chosen. Such a mesh has ``accuracy`` and ``radii`` as well.
 
@@ -131,8 +133,12 @@ class Disc:
     radii: tuple[float, ...] | None = None
     accuracy: float | None = None
     estimated: float | None = None
+    rim: Held = field(default=CLAMPED, metadata={"quiet": True})
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "rim", checked_end("mesh.rim", self.rim))
+        if (self.rim if isinstance(self.rim, str) else self.rim["kind"]) != CLAMPED:
+            raise InputError("mesh.rim", self.rim, "the rim of a disc is clamped; a cap of height 0 is flat too and takes every support")
         _check_accuracy(self)
         if self.open:
             return
@@ -180,11 +186,11 @@ class Disc:
         if self.open:
             raise InputError("mesh.accuracy", self.accuracy, "its elements are still to be chosen; refine the mesh of a branch's scene")
         if self.ratio == 1 and self.radii is None:
-            return type(self)(2 * self.elements)
+            return replace(self, elements=2 * self.elements)
         ends = self.breakpoints()
         halved = np.empty(2 * self.elements + 1)
         halved[::2], halved[1::2] = ends, ends[:-1] + np.diff(ends) / 2
-        return type(self)(radii=tuple(halved))
+        return self._ending(halved)
 
     def with_elements(self, elements: int) -> Self:
         """Another number of elements whose ends are the same function of k/elements.
@@ -199,14 +205,24 @@ class Disc:
             return self
         if self.radii is not None:
             ends = np.interp(np.linspace(0, self.elements, elements + 1), np.arange(self.elements + 1), self.radii)
-            return type(self)(radii=tuple(ends))
-        return type(self)(elements, graded_alike(self.elements, self.ratio, elements))
+            return self._ending(ends)
+        return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
 
-    def supports(self) -> tuple[frozenset[str], frozenset[str]]:
-        return frozenset({"u"}), frozenset({"u", "w"})
+    def _ending(self, radii: Array) -> Self:
+        """The same disc with elements that end at given radii."""
+        return type(self)(radii=tuple(radii), rim=self.rim)
+
+    def supports(self) -> tuple[Support, Support]:
+        return POLE, support_of(self.rim)
 
 
-def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float] | None = None, accuracy: float | None = None) -> Disc:
+def disc(
+    elements: int | None = None,
+    ratio: float = 1.0,
+    radii: Sequence[float] | None = None,
+    accuracy: float | None = None,
+    rim: Held = CLAMPED,
+) -> Disc:
     """Mesh of the flat, clamped disc.
 
     Parameters
@@ -219,6 +235,8 @@ def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float]
         Ends of the elements, increasing from 0 to 1; in place of ``elements`` and ``ratio``.
     accuracy : float, optional
         Relative accuracy for which elements and degree are to be chosen; in place of all of the above.
+    rim : str or mapping
+        How the rim is held: "clamped", and where if not at radius 1 and height 0, ``{"kind": "clamped", "radius": 1.2}``.
 
     Returns
     -------
@@ -237,7 +255,7 @@ def disc(elements: int | None = None, ratio: float = 1.0, radii: Sequence[float]
     >>> fm.disc(radii=(0.0, 0.5, 0.8, 1.0)).elements
     3
     """
-    return Disc(elements=elements, ratio=ratio, radii=radii, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
+    return Disc(elements=elements, ratio=ratio, radii=radii, accuracy=accuracy, rim=rim)  # type: ignore[arg-type]  # checked there
 
 
 def _check_accuracy(mesh: Disc) -> None:

@@ -30,7 +30,7 @@ from ..errors import InputError, unknown_name
 from .dialects import READERS, Lines, UnreadableError, read_lines
 from .merging import mended, merged
 from .meridian import LEAST_LENGTH, ROUND_OFF, Array, Meridian, check_elements, extent
-from .supports import POLE, SUPPORTS, Support, check_support
+from .supports import POLE, Held, Support, checked_end, support_of
 
 #: kinds of files that are written, and read as well, by their suffix; with the format that meshio is to write
 FORMATS = {".vtu": "vtu", ".msh": "gmsh", ".vtk": "vtk", ".xdmf": "xdmf"}
@@ -54,8 +54,9 @@ class Curve:
         Whether cells have a point inside and are arcs of parabolas. Otherwise they are straight.
     divisions : int
         Number of elements that a cell is divided into.
-    first, last : str
-        How the ends are held, see :mod:`.supports`; an end on the axis is a pole, and a closed curve has none.
+    first, last : str or mapping
+        How the ends are held and, if not where they rest, where, see :mod:`.supports`; an end on the axis is a pole, and a closed
+        curve has none.
     repaired : sequence of str
         In words, what was done about points that agree to round-off only. What is done here is added; no number depends on it.
 
@@ -68,8 +69,8 @@ class Curve:
     points: tuple[tuple[float, float], ...]
     curved: bool = False
     divisions: int = 1
-    first: str = "clamped"
-    last: str = "clamped"
+    first: Held = "clamped"
+    last: Held = "clamped"
     repaired: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
@@ -81,7 +82,7 @@ class Curve:
         except InputError as error:
             raise InputError("mesh.divisions", self.divisions, error.allowed) from None
         for name in ("first", "last"):
-            check_support(f"mesh.{name}", getattr(self, name))
+            store(self, **{name: checked_end(f"mesh.{name}", getattr(self, name))})
         size = extent(*np.array(self.points).T)
         if np.isfinite(size) and not 1 / _LARGEST <= size <= _LARGEST:
             raise InputError("mesh.points", f"a size of {size:.3g}", f"a size from {1 / _LARGEST:.0e} to {_LARGEST:.0e} is allowed")
@@ -170,8 +171,8 @@ class Curve:
         if self.closed:
             return ()
         first, last = (
-            POLE if point[0] == 0 else SUPPORTS[name]
-            for point, name in zip((self.points[0], self.points[-1]), (self.first, self.last), strict=True)
+            POLE if point[0] == 0 else support_of(end)
+            for point, end in zip((self.points[0], self.points[-1]), (self.first, self.last), strict=True)
         )
         return first, last
 
@@ -181,8 +182,8 @@ def meridian_from_points(
     cells: ArrayLike | None = None,
     *,
     divisions: int = 1,
-    first: str = "clamped",
-    last: str = "clamped",
+    first: Held = "clamped",
+    last: Held = "clamped",
 ) -> Curve:
     """A meridian from points and the cells between them, brought into the order that the module describes.
 
@@ -211,7 +212,12 @@ def meridian_from_points(
 
 
 def read_meridian(
-    path: str | PathLike[str], *, group: str | int | None = None, divisions: int = 1, first: str = "clamped", last: str = "clamped"
+    path: str | PathLike[str],
+    *,
+    group: str | int | None = None,
+    divisions: int = 1,
+    first: Held = "clamped",
+    last: Held = "clamped",
 ) -> Curve:
     """A meridian from a mesh file (.vtu, .msh, .vtk, .xdmf, .vtp, .inp), see :mod:`.mesh_files`.
 

@@ -10,6 +10,7 @@ from skfem.quadrature import get_quadrature
 from ..errors import InputError
 from ..threads import cached_property
 from .elements import line_element, lobatto, meridian_order
+from .lift import lift_of
 from .meridian import LEAST_LENGTH, Array, Meridian, extent, side
 from .supports import as_support, floats, free_rotations
 
@@ -29,9 +30,16 @@ class Numbering:
     anchored : frozenset of {"along", "shift", "tilt"}
         Rigid motions that something outside, such as a magnetic source, sees: along the axis, across it, and about a diameter. They are
         not free, and nothing is pinned for them.
+    ends : tuple of float
+        Places along the meridian at which elements end beside the breakpoints of the mesh: where the sheet has a jump.
+
+    prestretch : float
+        How far the held ends are carried from where they rest, see :mod:`.lift`.
 
     Attributes
     ----------
+    lift : Lift or None
+        The displacement that carries the held ends to their places; the unknowns are what there is beside it.
     closed : bool
         Whether the last node is the first one.
     size : float
@@ -83,9 +91,17 @@ class Numbering:
         2 pi times the quadrature weight on the reference element.
     """
 
-    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
+    def __init__(
+        self,
+        mesh: Meridian,
+        degree: int,
+        quadrature: int | None = None,
+        anchored: frozenset[str] = frozenset(),
+        ends: tuple[float, ...] = (),
+        prestretch: float = 1.0,
+    ) -> None:
         self.mesh, self.degree, self.anchored, self.side = mesh, degree, anchored, side(mesh)
-        self.ends: Array = mesh.breakpoints()
+        self.ends: Array = with_ends(mesh.breakpoints(), ends)
         self.sizes: Array = np.diff(self.ends)
         line = skfem.MeshLine(self.ends)
         element = line_element(degree)
@@ -96,6 +112,7 @@ class Numbering:
         self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
         self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.lift = lift_of(mesh, prestretch)
         self.radial = bool((self.s == self.R).all())
         self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
@@ -120,6 +137,8 @@ class Numbering:
         self.nodes: NDArray[np.int64] = _folded(n_nodes) if self.closed else np.arange(n_nodes)
         self.n_nodes = n_nodes - int(self.closed)
         adrift = floats(self.supports)
+        if self.lift is not None:
+            Z = Z + self.lift.at(self.mesh, self.ends[[0, -1]])[2]
         level = np.abs(Z) <= LEAST_LENGTH * size
         in_plane = [pole or ("w" in end.held and at_zero) for pole, end, at_zero in zip(on_axis, self.supports, level, strict=False)]
         self.loose = adrift and "along" in self.anchored
@@ -134,7 +153,7 @@ class Numbering:
         self.pin = self.widest if adrift and not self.loose else None
         off_axis = [end for end, pole in zip(self.supports, on_axis, strict=False) if not pole]
         self.spreads = any("u" not in end.held for end in off_axis)
-        walls = [R[k] ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)]
+        walls = [(R[k] if end.radius is None else end.radius) ** 2 if end.wall else 0.0 for k, end in enumerate(self.supports)]
         self.wall = self.between(walls) if any(walls) else None
         self.free_ends = [-k for k, end in enumerate(self.supports) if not end.held]
 
@@ -163,7 +182,7 @@ class Numbering:
         self.half_bandwidth = band_of(self.gather, self.n_free) if self.closed else min(2 * self.degree + 1, max(self.n_free - 1, 0))
         self.fields = tuple(_as_slice(np.sort(column[column < self.n_free])) for column in numbers.T)
         self.pole = int(numbers[self.nodes[0], 1])
-        self.first_height = float(self.mesh.position(self.ends[:1])[1][0])
+        self.first_height = float(self._lifted_ends[1, 0])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -185,9 +204,23 @@ class Numbering:
         return np.stack(self.mesh.position(self.ends))
 
     @cached_property
+    def _lifted_ends(self) -> Array:
+        """Where the ends of the elements are while all unknowns are zero."""
+        return self._end_positions if self.lift is None else self._end_positions + self.lift.at(self.mesh, self.ends)[::2]
+
+    @cached_property
+    def lifted(self) -> tuple[Array, Array, Array, Array]:
+        """(rho, rho_x, eta, eta_x) at the quadrature points while all unknowns are zero."""
+        if self.lift is None:
+            return self.R, self.R_x, self.Z, self.Z_x
+        u, u_s, w, w_s = self.lift.at(self.mesh, self.s)
+        return self.R + u, self.R_x + u_s * self.sizes, self.Z + w, self.Z_x + w_s * self.sizes
+
+    @cached_property
     def _axis(self) -> list[tuple[int, float]]:
         """Unknown and height at rest of each of :attr:`axis_nodes`."""
-        heights = self.mesh.position(self.node_parameters()[self.axis_nodes])[1]
+        s = self.node_parameters()[self.axis_nodes]
+        heights = self.mesh.position(s)[1] + (0.0 if self.lift is None else self.lift.at(self.mesh, s)[2])
         return list(zip(self.numbers[self.nodes[self.axis_nodes], 1].tolist(), heights.tolist(), strict=True))
 
     @cached_property
@@ -203,7 +236,7 @@ class Numbering:
 
     @cached_property
     def reference_volume(self) -> float:
-        """Volume that the membrane encloses at rest, over R0^3."""
+        """Volume that the membrane encloses while all unknowns are zero, over R0^3."""
         return self.side * float((self.weights * self._volume_density).sum()) + 0.0
 
     @cached_property
@@ -213,7 +246,8 @@ class Numbering:
 
     @property
     def _volume_density(self) -> Array:
-        return -(self.R**2) * self.Z_x / 2 if self.lids else self.R * self.R_x * self.Z
+        rho, rho_x, eta, eta_x = self.lifted
+        return -(rho**2) * eta_x / 2 if self.lids else rho * rho_x * eta
 
     @cached_property
     def center(self) -> float:
@@ -247,6 +281,14 @@ class Numbering:
         s = np.asarray(s, dtype=float)
         element = np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, self.n_elements - 1)
         return element, (s - self.ends[element]) / self.sizes[element]
+
+
+def with_ends(breakpoints: Array, further: tuple[float, ...]) -> Array:
+    """Element ends with further ones between them; one that is an end already, to round-off, makes no element of its own."""
+    first, last = breakpoints[0], breakpoints[-1]
+    near = LEAST_LENGTH * (last - first) + 1e-9 * np.diff(breakpoints).min()
+    new = [s for s in sorted(set(further)) if first < s < last and np.abs(breakpoints - s).min() > near]
+    return np.sort(np.append(breakpoints, new)) if new else breakpoints
 
 
 def band_of(gather: NDArray[np.int64], n_free: int) -> int:

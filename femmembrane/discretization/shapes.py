@@ -31,7 +31,7 @@ import numpy as np
 
 from ..checks import between, store
 from .meridian import ELEMENTS, Array, check_elements, check_ratio, geometric_ends, graded_alike
-from .supports import POLE, SUPPORTS, Support, check_support
+from .supports import POLE, Held, Support, checked_end, support_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class _Graded:
         object.__setattr__(self, "ratio", check_ratio(self.ratio, "size of the last element over size of the first"))
         for f in fields(self):
             if f.name in _ENDS:
-                check_support(f"mesh.{f.name}", getattr(self, f.name))
+                store(self, **{f.name: checked_end(f"mesh.{f.name}", getattr(self, f.name))})
 
     @property
     def start(self) -> float:
@@ -89,8 +89,9 @@ class Annulus(_Graded):
         Over R0, the outer radius; between 0 and 1.
     elements, ratio : int, float
         Number of elements, and the size of the outermost over the size of the innermost.
-    inner, outer : str
-        How the edges are held, see :mod:`.supports`; a ``hub`` is a rigid disc of the inner radius.
+    inner, outer : str or mapping
+        How the edges are held and, if not where they rest, where (``{"kind": "clamped", "radius": 1.2}``), see :mod:`.supports`; a
+        ``hub`` is a rigid disc of the inner radius.
 
     Raises
     ------
@@ -98,8 +99,8 @@ class Annulus(_Graded):
     """
 
     inner_radius: float
-    inner: str = "hub"
-    outer: str = "clamped"
+    inner: Held = "hub"
+    outer: Held = "clamped"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -124,7 +125,7 @@ class Annulus(_Graded):
         return np.ones_like(s), np.zeros_like(s)
 
     def supports(self) -> tuple[Support, Support]:
-        return SUPPORTS[self.inner], SUPPORTS[self.outer]
+        return support_of(self.inner), support_of(self.outer)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,8 +140,8 @@ class Cap(_Graded):
         Height of the apex over the plane of the rim, in R0. A negative height makes a bowl, whose inside is above; 0 makes a flat disc.
     elements, ratio : int, float
         Number of elements, and the size of the element at the rim over the size of the element at the apex.
-    rim : str
-        How the rim is held, see :mod:`.supports`.
+    rim : str or mapping
+        How the rim is held and, if not where it rests, where (``{"kind": "clamped", "radius": 1.2}``), see :mod:`.supports`.
 
     Raises
     ------
@@ -148,7 +149,7 @@ class Cap(_Graded):
     """
 
     height: float
-    rim: str = "clamped"
+    rim: Held = "clamped"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -182,7 +183,7 @@ class Cap(_Graded):
         return np.cos(s / self._radius), -math.copysign(1.0, self.height) * np.sin(s / self._radius)
 
     def supports(self) -> tuple[Support, Support]:
-        return POLE, SUPPORTS[self.rim]
+        return POLE, support_of(self.rim)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,8 +228,8 @@ class Cylinder(_Graded):
         Over R0, the radius.
     elements, ratio : int, float
         Number of elements, and the size of the lowest over the size of the topmost.
-    top, bottom : str
-        How the ends are held, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
+    top, bottom : str or mapping
+        How the ends are held and, if not where they rest, where, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
 
     Raises
     ------
@@ -236,8 +237,8 @@ class Cylinder(_Graded):
     """
 
     length: float
-    top: str = "clamped"
-    bottom: str = "clamped"
+    top: Held = "clamped"
+    bottom: Held = "clamped"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -258,7 +259,7 @@ class Cylinder(_Graded):
         return np.zeros_like(s), -np.ones_like(s)
 
     def supports(self) -> tuple[Support, Support]:
-        return SUPPORTS[self.top], SUPPORTS[self.bottom]
+        return support_of(self.top), support_of(self.bottom)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,7 +314,7 @@ class Torus:
         return ()
 
 
-def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: str = "hub", outer: str = "clamped") -> Annulus:
+def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: Held = "hub", outer: Held = "clamped") -> Annulus:
     """Mesh of a flat ring.
 
     Parameters
@@ -323,7 +324,7 @@ def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, i
     elements : int
     ratio : float
         Size of the outermost element over the size of the innermost.
-    inner, outer : str
+    inner, outer : str or mapping
         How the edges are held, see :mod:`.supports`; a ``hub`` is a rigid disc of the inner radius.
 
     Returns
@@ -347,7 +348,7 @@ def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, i
     return Annulus(inner_radius=inner_radius, elements=elements, ratio=ratio, inner=inner, outer=outer)
 
 
-def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: str = "clamped") -> Cap:
+def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: Held = "clamped") -> Cap:
     """Mesh of a spherical cap over a rim of unit radius.
 
     Parameters
@@ -357,7 +358,7 @@ def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: str = 
     elements : int
     ratio : float
         Size of the element at the rim over the size of the element at the apex.
-    rim : str
+    rim : str or mapping
         How the rim is held, see :mod:`.supports`.
 
     Returns
@@ -411,7 +412,13 @@ def sphere(elements: int = ELEMENTS, ratio: float = 1.0) -> Sphere:
     return Sphere(elements=elements, ratio=ratio)
 
 
-def cylinder(length: float, elements: int = ELEMENTS, ratio: float = 1.0, top: str = "clamped", bottom: str = "clamped") -> Cylinder:
+def cylinder(
+    length: float,
+    elements: int = ELEMENTS,
+    ratio: float = 1.0,
+    top: Held = "clamped",
+    bottom: Held = "clamped",
+) -> Cylinder:
     """Mesh of a tube of unit radius about the axis.
 
     Parameters

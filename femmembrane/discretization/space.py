@@ -45,8 +45,16 @@ class Space(Numbering):
         The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
     """
 
-    def __init__(self, mesh: Meridian, degree: int, quadrature: int | None = None, anchored: frozenset[str] = frozenset()) -> None:
-        super().__init__(mesh, degree, quadrature, anchored)
+    def __init__(
+        self,
+        mesh: Meridian,
+        degree: int,
+        quadrature: int | None = None,
+        anchored: frozenset[str] = frozenset(),
+        ends: tuple[float, ...] = (),
+        prestretch: float = 1.0,
+    ) -> None:
+        super().__init__(mesh, degree, quadrature, anchored, ends, prestretch)
         self._tabulate()
 
     def _tabulate(self) -> None:
@@ -87,10 +95,10 @@ class Space(Numbering):
         return R + float(x[i]) if i < self.n_free else R, Z + float(x[j]) if j < self.n_free else Z
 
     def _end(self, k: int) -> tuple[int, int, float, float]:
-        """Unknowns and position at rest of an end of elements, looked up once."""
+        """Unknowns and position while all unknowns are zero of an end of elements, looked up once."""
         at = k % (self.n_elements + 1)
         i, j = self.numbers[self.nodes[self.degree * at]]
-        R, Z = self._end_positions[:, at]
+        R, Z = self._lifted_ends[:, at]
         return self._known_ends.setdefault(k, (int(i), int(j), float(R), float(Z)))
 
     def axis_heights(self, x: Array) -> list[float]:
@@ -103,6 +111,28 @@ class Space(Numbering):
         extended = np.empty(self.n_free + 1)
         extended[:-1], extended[-1] = x, 0.0
         return extended
+
+    def displacement(self, x: Array, s: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """(u, u_s, w, w_s) of a state at parameters s, the lift included; :meth:`evaluate` gives what the unknowns add to it."""
+        own = self.evaluate(x, s)
+        if self.lift is None:
+            return own
+        u, u_s, w, w_s = (a + b for a, b in zip(own, self.lift.at(self.mesh, np.asarray(s, dtype=float)), strict=True))
+        return u, u_s, w, w_s
+
+    def displacement_at_quadrature(self, x: Array) -> Array:
+        """(u, u_x, w, w_x) of a state at the quadrature points, the lift included, shape (4, n_quadrature, n_elements)."""
+        own: Array = self.at_quadrature(x).reshape(4, *self.s.shape)
+        return own if self.lift is None else own + self.lifting
+
+    @cached_property
+    def lifting(self) -> Array:
+        """(u, u_x, w, w_x) of the lift at the quadrature points, shape (4, n_quadrature, n_elements)."""
+        if self.lift is None:
+            return np.zeros((4, *self.s.shape))
+        lift = self.lift.at(self.mesh, self.s)
+        lift[1::2] *= self.sizes
+        return lift
 
     def at_quadrature(self, x: Array) -> Array:
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
@@ -167,9 +197,9 @@ class Space(Numbering):
         matrix = sparse.csc_matrix((v[nonzero], (r[nonzero], c[nonzero])), shape=(pattern.size, 10 * self.s.size))
         return pattern % self.n_free, pattern // self.n_free, matrix
 
-    def mass_band(self) -> Array:
-        """Mass matrix Int phi.phi 2 pi R dS of the reference area, in band storage."""
-        area = self.weights * self.R * np.hypot(self.R_x, self.Z_x)
+    def mass_band(self, area: Array | None = None) -> Array:
+        """Mass matrix Int phi.phi 2 pi R dS of the reference area, or of what ``area`` has at the points, in band storage."""
+        area = self.area_weights if area is None else area
         density = np.zeros((len(HESSIAN_PAIRS), *area.shape))
         density[HESSIAN_PAIRS.index((0, 0))] = density[HESSIAN_PAIRS.index((2, 2))] = area
         return self.assemble_band(density.reshape(-1, self.n_elements))
@@ -192,8 +222,9 @@ class Space(Numbering):
         low, size = float(Z.min() + Z.max()), float(max(np.ptp(R), np.ptp(Z)))
         if np.abs(R - R[::-1, ::-1]).max() > _MIRRORED * size or np.abs(Z + Z[::-1, ::-1] - low).max() > _MIRRORED * size:
             return []
-        u, _, w, _ = (values.reshape(s.shape)[::-1, ::-1] for values in self.evaluate(x, s.ravel()))
-        return [self.interpolate(u, -w)]
+        u, _, w, _ = (values.reshape(s.shape)[::-1, ::-1] for values in self.displacement(x, s.ravel()))
+        u0, _, w0, _ = (0.0, 0.0, 0.0, 0.0) if self.lift is None else self.lift.at(self.mesh, s)
+        return [self.interpolate(u - u0, -w - w0)]
 
     def _at_pin(self, w: Array) -> float:
         """Value of the interpolant at the node that is held along the axis."""
@@ -222,7 +253,11 @@ class Space(Numbering):
         value, slope = self.shape_functions(np.array([0.0, 1.0]))
         u, w = np.split(self.extend(x)[self.gather], 2)
         u_s, w_s = ((lambda both: (both[1, :-1] + both[0, 1:]) / 2)(slope @ c / self.sizes) for c in (u, w))
-        return (value @ u)[0, 1:], u_s, (value @ w)[0, 1:], w_s
+        own = (value @ u)[0, 1:], u_s, (value @ w)[0, 1:], w_s
+        if self.lift is None:
+            return own
+        u, u_s, w, w_s = (a + b for a, b in zip(own, self.lift.at(self.mesh, self.ends[1:-1]), strict=True))
+        return u, u_s, w, w_s
 
     def kinks(self, x: Array) -> Array:
         """Jumps of the deformed meridian's slope, relative to the smaller of both sides: where elements meet, then at the poles.
@@ -266,6 +301,9 @@ class Space(Numbering):
         poles = [(k, -k) for k in (0, 1) if self.on_axis[k]]
         turned = [2 * abs(at_rest[end].imag) for end in poles]
         rest_kinks = np.append(np.abs(at_rest[1, :-1] - at_rest[0, 1:]), turned)
+        if self.lift is not None:
+            _, u_s, _, w_s = self.lift.at(self.mesh, np.stack([self.ends[:-1], self.ends[1:]]))
+            at_rest = at_rest + (u_s + 1j * w_s) / length
         return at_rest, self.shape_functions(np.array([0.0, 1.0]))[1], 1 / (length * self.sizes), rest_kinks, poles
 
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
@@ -277,7 +315,7 @@ class Space(Numbering):
         """
         element, xi = self.locate(s)
         if self.n_elements == 1 or self.degree > _RECOVERED:
-            _, u_s, _, w_s = self.evaluate(x, s)
+            _, u_s, _, w_s = self.displacement(x, s)
             return u_s, w_s
         gauss = (np.polynomial.legendre.leggauss(self.degree)[0] + 1) / 2
         ends, size = self.ends, self.sizes
@@ -294,18 +332,23 @@ class Space(Numbering):
         nodes = np.concatenate([[0.0], gauss, [1.0]])
         values = np.concatenate([at_ends[:, None, :-1], at_gauss, at_ends[:, None, 1:]], axis=1)[:, :, element]
         u_s, w_s = np.einsum("gn,fgn->fn", lagrange(np.repeat(nodes[:, None], xi.size, axis=1), xi), values)
+        if self.lift is not None:
+            lift = self.lift.at(self.mesh, np.asarray(s, dtype=float))
+            u_s, w_s = u_s + lift[1], w_s + lift[3]
         return u_s, w_s
 
 
 @lru_cache(maxsize=32)
-def space_of(mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset()) -> Space:
+def space_of(
+    mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset(), ends: tuple[float, ...] = (), prestretch: float = 1.0
+) -> Space:
     """The space of a mesh and a degree, built once."""
-    return Space(mesh, degree, anchored=anchored)
+    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch)
 
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return space_of(scene.mesh, scene.degree, anchored(scene))
+    return space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch)
 
 
 def anchored(scene: Any) -> frozenset[str]:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from ..physics.materials import Material
     from ..scene import Scene
 
+#: columns of data that hold the displacement beside which the unknowns count
+LIFT = ("lift_u", "lift_u_x", "lift_w", "lift_w_x")
 #: held while expressions are built: CasADi has one mode, for all threads, of multiplying symbols
 BUILDING = Guard()
 
@@ -59,11 +61,17 @@ def point_expressions(
     parameters = ca.SX.sym("parameters", 2)
     flat = "Z" not in columns
     R, R_x, weight, Z, Z_x = (data[columns.index(c)] if c in columns else ca.SX(0) for c in ("R", "R_x", "weight", "Z", "Z_x"))
-    u, u_x, w, w_x = (local[k] for k in range(4))
+    own_w, own_w_x = local[2], local[3]
+    u, u_x, w, w_x = (local[k] + data[columns.index(name)] if name in columns else local[k] for k, name in enumerate(LIFT))
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
+    if "thickness" in columns:
+        area = area * data[columns.index("thickness")]  # all that is integrated over it belongs to the bulk of the sheet
     material = strain_energy(scene.material, scene.tension_field)
     stress, tangent = response_expressions(material, ca.vertcat(e1, e2))
+    modulus = data[columns.index("modulus")] if "modulus" in columns else None
+    if modulus is not None:
+        stress, tangent = modulus * stress, modulus * tangent
     # the chain rule through closed-form stresses keeps digits that differentiating the energy would lose at small strain; written out, it
     # takes half the operations
     slopes = ca.jacobian(ca.vertcat(e1, e2), local)
@@ -72,7 +80,7 @@ def point_expressions(
     hessian = area * (ca.mtimes([slopes.T, tangent, slopes]) + bending)
     enclosed = lidded_volume_density(R + u, Z_x + w_x) if space.lids else volume_density(R + u, R_x + u_x, Z + w)
     if "wall" in columns:
-        enclosed = enclosed + wall_density(data[columns.index("wall")], data[columns.index("wall_x")], w, w_x)
+        enclosed = enclosed + wall_density(data[columns.index("wall")], data[columns.index("wall_x")], own_w, own_w_x)
     inside = weight if space.side > 0 else -weight
     volume = inside * enclosed
     magnetic = ca.SX(0)
@@ -91,7 +99,7 @@ def point_expressions(
         second, first = ca.hessian(load, local)
         gradient, hessian = gradient + first, hessian + second
     return (data, local, parameters), {
-        "elastic": area * material.energy(e1, e2),
+        "elastic": (area if modulus is None else area * modulus) * material.energy(e1, e2),
         "magnetic": magnetic,
         "load": load,
         "volume": volume,

@@ -20,9 +20,10 @@ from ..kernels import kernels
 from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
+from ..physics.sheet import Sheet
 from ..physics.tension_field import strain_energy
 from ..threads import cached_property
-from .expressions import BUILDING, casadi_answers_numpy, point_expressions, point_rows, response_expressions
+from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .replay import PointProgram, Replay, at_points
 
 if TYPE_CHECKING:
@@ -153,8 +154,14 @@ class Potential:
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        self.space = space_of(scene.mesh, scene.degree, fixed) if quadrature is None else Space(scene.mesh, scene.degree, quadrature, fixed)
+        ends, stretch = scene.element_ends, scene.prestretch
+        self.space = (
+            space_of(scene.mesh, scene.degree, fixed, ends, stretch)
+            if quadrature is None
+            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch)
+        )
         space = self.space
+        self.sheet = Sheet.of(scene)
         if not space.n_free:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
@@ -175,6 +182,10 @@ class Potential:
             columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
         if forces is not None:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
+        if self.sheet is not None:
+            columns |= self.sheet.columns(space.R, space.Z, space.s)
+        if space.lift is not None:
+            columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with casadi_answers_numpy():
             self.symbols, self.terms = point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
@@ -192,14 +203,21 @@ class Potential:
         return strain_energy(self.scene.material, self.scene.tension_field)
 
     @cached_property
-    def mass(self) -> Array:
-        """Mass matrix of the reference area in band storage, shape (3 kd + 1, n_free)."""
-        return self.space.mass_band()
+    def bulk(self) -> Array:
+        """Weights of the integral of the thickness over the reference area, with the 2 pi, shape (n_quadrature, n_elements)."""
+        space = self.space
+        thickness = 1.0 if self.sheet is None else self.sheet.factors(space.R, space.Z, space.s)[0]
+        return space.area_weights if np.isscalar(thickness) else space.area_weights * thickness
 
-    @property
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrix of the membrane, over that of its reference area, in band storage, shape (3 kd + 1, n_free)."""
+        return self.space.mass_band(self.bulk)
+
+    @cached_property
     def area(self) -> float:
-        """Reference area of the membrane."""
-        return self.space.reference_area
+        """Reference area of the membrane, of an uneven one times its thickness."""
+        return float(self.bulk.sum())
 
     @cached_property
     def rigid(self) -> Array | None:
@@ -208,7 +226,7 @@ class Potential:
         if space.pin is None:
             return None
         density = np.zeros((4, *space.R.shape))
-        density[2] = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
+        density[2] = self.bulk
         return space.assemble_vector(density.reshape(-1, space.n_elements))[:, None] / np.sqrt(self.area)
 
     @cached_property
@@ -269,7 +287,7 @@ class Potential:
             return np.inf
         space = self.space
         u, _, w, _ = self.elements.at_quadrature(np.ascontiguousarray(x)).reshape(4, *space.R.shape)
-        rho, eta, poles = space.R + u, space.Z + w, space.axis_heights(x)
+        rho, eta, poles = space.lifted[0] + u, space.lifted[2] + w, space.axis_heights(x)
         square = [s.distance_squared(rho, eta).min() for s in self.sources]
         # a source all along the axis may run through hubs; a scene with a pole refuses it
         square += [s.distance_squared(0.0, pole) for s in self.sources if "along" in s.sees for pole in poles]
@@ -291,7 +309,7 @@ class Potential:
     def _meridian(self, x: Array) -> Array:
         """Positions (rho, eta) of the nodes, shape (2, n)."""
         s = self.space.node_parameters()
-        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.evaluate(x, s)
+        (R, Z), (u, _, w, _) = self.space.mesh.position(s), self.space.displacement(x, s)
         return np.stack([R + u, Z + w])
 
     def largest(self, x: Array) -> tuple[float, float]:
@@ -303,7 +321,7 @@ class Potential:
         return evaluation.force_scale(pressure)
 
     def response(self, e1: Array, e2: Array) -> Array:
-        """Principal mechanical stresses and their derivatives with respect to the Hencky strains.
+        """Principal mechanical stresses and their derivatives with respect to the Hencky strains, where the modulus is 1.
 
         Returns
         -------
@@ -326,7 +344,7 @@ class Potential:
         Returns
         -------
         ndarray, shape (6, n)
-            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T; zeros without sources and loads.
+            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T, where the thickness is 1; zeros without sources and loads.
         """
         if not self.surrounded:
             return np.zeros((6, np.size(rho)))

@@ -36,6 +36,7 @@ from ..discretization.meridian import Disc, Meridian
 from ..discretization.mesh_files import Curve, read_meridian
 from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
+from ..physics.along import Along
 from ..physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
 from ..physics.loads import HubForce, Hydrostatic, Weight
 from ..physics.magnetics import Dipole
@@ -80,7 +81,7 @@ SHAPES: dict[str, Any] = {
 #: keys of [mesh] beside the file that holds the meridian
 FILE_KEYS = ("group", "divisions", "first", "last")
 SCENE_KEYS: dict[str, tuple[str, ...]] = {
-    "membrane": ("susceptibility", "radius_to_thickness"),
+    "membrane": ("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
     "mesh": ("degree",),
     "effects": ("tension_field",),
 }
@@ -184,7 +185,14 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
         "scales": _arguments(scene.scales) if scene.scales else {},
     }
+    for name in ("thickness", "modulus"):
+        if callable(getattr(getattr(scene, name), "given", None)):
+            raise InputError(
+                f"membrane.{name}", getattr(scene, name).given, "a function has no name in scene files; an expression or a table has"
+            )
     tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
+    if scene.prestretch == 1:
+        del tables["membrane"]["prestretch"]
     if scene.scales:  # which hold it already
         del tables["membrane"]["radius_to_thickness"]
     if scene.run and scene.run.control != "arc-length":
@@ -283,13 +291,17 @@ def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any)
 
 
 def _arguments(value: Any) -> dict[str, Any]:
-    return {f.name: getattr(value, f.name) for f in fields(value)}
+    found = {f.name: getattr(value, f.name) for f in fields(value)}
+    quiet = {f.name for f in fields(value) if f.metadata.get("quiet") and found[f.name] == f.default}  # newer than files that lack it
+    return {name: part for name, part in found.items() if name not in quiet}
 
 
 def _plain(value: Any) -> Any:
     """Lists, dictionaries and Python numbers only. None is left out, since TOML has no null."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items() if item is not None and item != ()}
+    if isinstance(value, Along):
+        return _plain(value.given)
     if isinstance(value, (tuple, list)):
         return [_plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value

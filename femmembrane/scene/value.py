@@ -14,10 +14,12 @@ from typing import Any, Self
 import numpy as np
 
 from ..checks import number, sequence, store, switch, whole
+from ..discretization.lift import lift_of
 from ..discretization.meridian import Meridian, disc
 from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
+from ..physics.along import Along
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source, distance_to_polyline
 from ..physics.materials import Material
@@ -27,6 +29,8 @@ from .run import Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 
 MAX_DEGREE = 8
+#: largest pre-stretch: its sixth power is still a number beside 1
+MAX_STRETCH = 1e6
 #: characters of a title
 MAX_TEXT = 1000
 #: bytes that a computation takes for each element and degree at least, measured on 20000 elements: by Newton's method, and by IPOPT
@@ -67,6 +71,12 @@ class Scene:
         Physical size and stiffness. Stresses and pressures are then given in Pa as well. They change no equilibrium.
     loads : sequence of Load
         Loads besides the pressure, such as ``Hydrostatic(gamma=...)``. Without a load nothing of loads is built.
+    thickness, modulus : float, str, table or callable, optional
+        Thickness over T and shear modulus over mu along the meridian, each a factor > 0: a number, an expression such as
+        ``"1 - 0.4*R**2"``, a table of (s, factor), or a function of (R, Z, s) (:mod:`~femmembrane.physics.along`). Left out: 1.
+    prestretch : float
+        How far the membrane is stretched before anything else acts: the rim of a flat disc or annulus is held at so many times its radius,
+        the ends of a tube at so many times their height. P, V and lengths stay in units of the reference R0.
 
     Raises
     ------
@@ -99,6 +109,9 @@ class Scene:
     analysis: Analysis = field(default_factory=Analysis)
     scales: Scales | None = None
     loads: tuple[Load, ...] = ()
+    thickness: Any = None
+    modulus: Any = None
+    prestretch: float = 1.0
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -127,8 +140,13 @@ class Scene:
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=switch("effects.tension_field", self.tension_field),
             title=_text("title", self.title),
+            thickness=Along.of("membrane.thickness", self.thickness),
+            modulus=Along.of("membrane.modulus", self.modulus),
+            prestretch=_prestretch("membrane.prestretch", self.prestretch),
         )
         self._check_size()
+        self._check_sheet()
+        lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
         self._check_sources()
         self._check_hubs()
 
@@ -146,6 +164,16 @@ class Scene:
         kept = 8 * (_PROFILES + 2) * count * degree + _BYTES_STEP
         if steps * kept > SMALL:
             require("run.steps" if run is not None and run.values is None else "run.values", steps, kept, "equilibria on this mesh")
+
+    def _check_sheet(self) -> None:
+        if self.thickness is None and self.modulus is None:
+            return
+        ends = self.mesh.breakpoints()
+        s = np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+        for key in ("thickness", "modulus"):
+            factor = getattr(self, key)
+            if factor is not None:
+                factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
 
     def _check_sources(self) -> None:
         R, Z = self.mesh.position(self.mesh.breakpoints())
@@ -186,6 +214,11 @@ class Scene:
     def open(self) -> bool:
         """Whether the elements are still to be chosen, for the accuracy that is asked for: nothing can be computed before."""
         return bool(getattr(self.mesh, "open", False))
+
+    @property
+    def element_ends(self) -> tuple[float, ...]:
+        """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet."""
+        return tuple(sorted({s for factor in (self.thickness, self.modulus) if factor is not None for s in factor.ends}))
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.
@@ -300,6 +333,10 @@ def _ratio(key: str, value: Any, scales: Scales | None) -> float:
         advice = "leave radius_to_thickness out, and it follows from the scales (Scene.replace does so when it is given other scales)"
         raise InputError(key, value, f"it contradicts {follows}; {advice}")
     return scales.radius_to_thickness
+
+
+def _prestretch(key: str, value: Any) -> float:
+    return number(key, value, "a finite number > 0 is allowed (1: not stretched)", above=0, most=MAX_STRETCH)
 
 
 def _susceptibility(key: str, value: Any) -> float | None:

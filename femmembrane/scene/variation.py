@@ -126,7 +126,8 @@ class Parameter:
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
-        return SimpleNamespace(**parts, mesh=scene.mesh, degree=scene.degree, tension_field=scene.tension_field)
+        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
+        return SimpleNamespace(**parts, **{name: getattr(scene, name) for name in kept})
 
     def _check_modulus(self, value: float, alpha: float) -> None:
         if not 0 < value * alpha < 2:

@@ -119,7 +119,7 @@ def _pull_at_edges(potential: Potential, state: State) -> dict[float, float]:
             continue
         end = space.ends[[-k]]
         (R, _), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
-        u, u_s, _, w_s = space.evaluate(state.x, end)
+        u, u_s, _, w_s = space.displacement(state.x, end)
         stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
         level = float((np.abs(R_s + u_s) / np.hypot(R_s + u_s, Z_s + w_s))[0])
         left[float(R[0])] = abs(float(stress[0])) * level / float(np.abs(state.evaluation.stress).max() or 1.0)
@@ -204,6 +204,6 @@ def _side(potential: Potential, evaluation: Evaluation) -> int:
 def _largest_stretch(potential: Potential, x: Array) -> float:
     """Logarithm of the largest principal stretch at the quadrature points."""
     space = potential.space
-    u, u_x, _, w_x = space.at_quadrature(x).reshape(4, *space.R.shape)
+    u, u_x, _, w_x = space.displacement_at_quadrature(x)
     along = np.hypot(space.R_x + u_x, space.Z_x + w_x) / np.hypot(space.R_x, space.Z_x)
     return float(np.log(max(along.max(), (1 + u / space.R).max())))

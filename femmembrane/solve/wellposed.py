@@ -136,9 +136,11 @@ def _folds(potential: Potential, x: Array, scale: float) -> Array:
     """Reference radii where two elements meet at so sharp an angle that a smooth meridian between them would be slack."""
     space = potential.space
     s = space.ends[1:-1]
-    (R, _), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
+    (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
     u, u_s, _, w_s = space.at_inner_ends(x)
     stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+    if potential.sheet is not None:
+        stress = stress * potential.sheet.factors(R, Z, s)[1]
     return R[unsupported(stress, scale, True)]
 
 

@@ -93,19 +93,19 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     density = np.stack(second_variation(space, response, potential.loads, pressure, n))
     band = layout.assemble(density)
     for end in space.free_ends if n else ():
-        rho = space.mesh.position(space.ends[[end]])[0] + space.evaluate(x, space.ends[[end]])[0]
+        rho = space.mesh.position(space.ends[[end]])[0] + space.displacement(x, space.ends[[end]])[0]
         i, j = layout.numbers[space.nodes[end], [RADIAL, VERTICAL]]
         work = np.pi * n * pressure * float(rho[0]) * (space.side if end == 0 else -space.side)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
-    rigid, spin = None, None
+    rigid, spin, mass = None, None, layout.mass(potential.bulk)
     motions = _rigid_motions(space, response, int(n))
     if len(motions):
-        area = space.area_weights
+        area = potential.bulk
         rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
-    if n == 1 and space.spins:
-        spin = _spin(space, layout, response, motions, pencil_of(band, layout.mass, layout.half_bandwidth, None, 0.0, rigid))
-    return AzimuthalOperator(band, layout.mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
+    if n == 1 and space.spins and potential.sheet is None:
+        spin = _spin(space, layout, response, motions, pencil_of(band, mass, layout.half_bandwidth, None, 0.0, rigid))
+    return AzimuthalOperator(band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
 
 
 def _products(first: Array, second: Array, area: Array) -> Array:

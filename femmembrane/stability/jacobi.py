@@ -105,8 +105,8 @@ def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
     """
     potential = equilibrium.potential
     space = potential.space
-    displacement = space.at_quadrature(equilibrium.state).reshape(4, space.n_quadrature, -1)
-    response = local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement))
+    displacement = space.displacement_at_quadrature(equilibrium.state)
+    response = local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
     smallest = np.minimum(response.W11, response.N1) / 2
     at = int(np.argmin(smallest))
     value = float(smallest.ravel()[at])
@@ -169,13 +169,13 @@ class _Coefficients:
     """Second derivatives of F along the radius, from Chebyshev interpolants in each element."""
 
     def __init__(self, potential: Potential, x: Array, pressure: float) -> None:
-        self.ends, self.pressure, self.loads = potential.space.mesh.breakpoints(), pressure, potential.loads
+        self.ends, self.pressure, self.loads = potential.space.ends, pressure, potential.loads
         angle = np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         size = np.diff(self.ends)
         s = self.ends[:-1, None] + size[:, None] * (1 + np.cos(angle)) / 2
-        mesh, displacement = potential.space.mesh, potential.space.evaluate(x, s.ravel())
+        mesh, displacement = potential.space.mesh, potential.space.displacement(x, s.ravel())
         (R, Z), (R_s, Z_s) = mesh.position(s.ravel()), mesh.tangent(s.ravel())
-        samples = self._regular(local_response(potential, (R, R_s, Z, Z_s), displacement)).reshape(-1, *s.shape)
+        samples = self._regular(local_response(potential, (R, R_s, Z, Z_s), displacement, s.ravel())).reshape(-1, *s.shape)
         transform = 2 / _SAMPLES * np.cos(np.arange(_SAMPLES)[:, None] * angle)
         transform[0] /= 2
         self._series = np.einsum("kp,cep->ekc", transform, samples)

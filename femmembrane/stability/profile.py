@@ -13,6 +13,7 @@ from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
 from ..physics.scales import Scales
+from ..physics.sheet import Sheet
 from ..physics.stress import total_stress
 from ..physics.tension_field import strain_energy
 from ..scene import Scene
@@ -78,7 +79,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     s : ndarray, shape (n,)
     """
     space = space_of_scene(scene)
-    u, own, w, _ = space.evaluate(x, s)
+    u, own, w, _ = space.displacement(x, s)
     u_s, w_s = space.recovered_slopes(x, s)
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
     pole = np.abs(R) <= LEAST_LENGTH * space.size  # there u/R is the limit u_s/R_s
@@ -90,6 +91,9 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
     rho, eta = R + u, Z + w
     mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
+    if (sheet := Sheet.of(scene)) is not None:
+        modulus = sheet.factors(R, Z, s)[1]
+        mechanical = (modulus * mechanical[0], modulus * mechanical[1])
     h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)

@@ -102,8 +102,14 @@ class LocalResponse:
     field: Array
 
 
-def local_response(potential: Potential, meridian: tuple[Array, ...], displacement: tuple[Array, ...]) -> LocalResponse:
-    """Response at points (R, R_x, Z, Z_x) of the reference meridian displaced by (u, u_x, w, w_x); R > 0 and any shape."""
+def local_response(
+    potential: Potential, meridian: tuple[Array, ...], displacement: tuple[Array, ...], s: Array | None = None
+) -> LocalResponse:
+    """Response at points (R, R_x, Z, Z_x) of the reference meridian displaced by (u, u_x, w, w_x); R > 0 and any shape.
+
+    Of an uneven sheet, which asks for the places ``s`` of the points (default their radii), stresses and moduli are forces per length:
+    times thickness and modulus.
+    """
     R, R_x, Z, Z_x = meridian
     u, u_x, w, w_x = displacement
     shape = R.shape
@@ -116,6 +122,12 @@ def local_response(potential: Potential, meridian: tuple[Array, ...], displaceme
     d = e1 - e2
     A = _stress_quotient(potential, e1, e2, s1 - s2, d) * _over_sinh(d) / (2 * l1 * l2)
     B = ((l1**2 + l2**2) / 2 * A - (s1 + s2) / 2) / (l1 * l2)
+    field = potential.field_energy(rho, eta).reshape(6, *shape)
+    if potential.sheet is not None:
+        thickness, modulus = potential.sheet.factors(R, Z, R if s is None else s)
+        force = thickness * modulus
+        s1, s2, d11, d12, d22, A, B = (part * force for part in (s1, s2, d11, d12, d22, A, B))
+        field = field * thickness
     return LocalResponse(
         rho=rho,
         eta=eta,
@@ -132,7 +144,7 @@ def local_response(potential: Potential, meridian: tuple[Array, ...], displaceme
         N2=s2 / l2**2,
         A=A,
         B=B,
-        field=potential.field_energy(rho, eta).reshape(6, *shape),
+        field=field,
     )
 
 
@@ -164,8 +176,8 @@ def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Arr
 def response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse:
     """Remembered for the other n of the same state."""
     space = potential.space
-    displacement = space.at_quadrature(np.frombuffer(state)).reshape(4, space.n_quadrature, -1)
-    return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement))
+    displacement = space.displacement_at_quadrature(np.frombuffer(state))
+    return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
 
 
 def second_variation(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: float, n: int) -> list[Array]:

@@ -37,12 +37,19 @@ class WaveUnknowns:
         open_curve = min((3 if kind else 2) * degree + (2 if kind else 1), max(self.n_free - 1, 0))
         self.half_bandwidth = band_of(self.gather, self.n_free) if space.closed else open_curve
         self._tabulate(space)
-        area = space.weights * space.R * np.hypot(space.R_x, space.Z_x)
-        zero = np.zeros_like(area)
-        self.mass = self.assemble(np.stack([area if i == j and i in VALUES else zero for i, j in PAIRS]))
-        self.mass.flags.writeable = False
-        points = (space.interpolation_points()[:, 0] - space.mesh.breakpoints()[0]) / np.diff(space.mesh.breakpoints())[0]
+        self._area, self._mass = space.area_weights, self._assembled_mass(space.area_weights)
+        points = (space.interpolation_points()[:, 0] - space.ends[0]) / space.sizes[0]
         self.node_values = space.shape_functions(points)[0]
+
+    def mass(self, bulk: Array) -> Array:
+        """Mass matrix of a membrane with these weights of its bulk at the quadrature points, in band storage."""
+        return self._mass if bulk is self._area else self._assembled_mass(bulk)
+
+    def _assembled_mass(self, bulk: Array) -> Array:
+        zero = np.zeros_like(bulk)
+        mass = self.assemble(np.stack([bulk if i == j and i in VALUES else zero for i, j in PAIRS]))
+        mass.flags.writeable = False
+        return mass
 
     def _tabulate(self, space: Space) -> None:
         n_local = space.degree + 1

@@ -224,7 +224,7 @@ class FoldRun(Run[FoldCurve]):
         """Smallest distance between a node and a source."""
         space, sources = self.problem.family.space, self.parameter.scene_at(point.number).sources
         s = space.node_parameters()
-        (R, Z), (u, _, w, _) = space.mesh.position(s), space.evaluate(point.state.x, s)
+        (R, Z), (u, _, w, _) = space.mesh.position(s), space.displacement(point.state.x, s)
         return min((float(np.sqrt(source.distance_squared(R + u, Z + w).min())) for source in sources), default=np.inf)
 
     def _ended(self, error: SolveError) -> End:

@@ -109,7 +109,7 @@ class Surface:
         """
         check_quantity(quantity, equilibrium.scene)
         if quantity == "zone":
-            zones, ends = equilibrium.zones(), equilibrium.scene.mesh.breakpoints()
+            zones, ends = equilibrium.zones(), equilibrium.potential.space.ends
             s = np.unique(np.concatenate([np.linspace(ends[0], ends[-1], _POINTS), [zone.s[1] for zone in zones]]))
             profile, values = equilibrium.profile(s), zones.numbers((s[1:] + s[:-1]) / 2).astype(np.float64)
         else:

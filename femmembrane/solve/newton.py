@@ -24,6 +24,8 @@ NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
+#: pressure of a trial step from which on products are no numbers: the trial is refused
+_ABSURD = 1e150
 #: largest force of a correction of P, relative to those that meet at a node: a guess may have the right shape and a wrong P
 PRESSURE = 1e-9
 
@@ -130,11 +132,11 @@ class Equations:
         bordered: Border | None = None,
     ) -> None:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        with np.errstate(over="ignore", invalid="ignore"):  # a trial step may be absurd: it is refused by what it gives
-            self.unbalanced = pressure * evaluation.volume_gradient - evaluation.gradient
+        self.finite = evaluation.finite and abs(pressure) < _ABSURD
+        gradient = evaluation.gradient
+        self.unbalanced = pressure * evaluation.volume_gradient - gradient if self.finite else np.full_like(gradient, np.nan)
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
-        self.finite = evaluation.finite and math.isfinite(pressure)
         self.bordered = evaluation.border(self._row, self._corner) if bordered is None and self.finite else bordered
         self._scales: tuple[float, float] | None = None
 

@@ -42,7 +42,7 @@ STEADY = 0.2
 UNRESOLVED = 3e-2
 #: largest pressure times size of a state that is asked for, and largest volume over the cube of the size
 HIGHEST, LARGEST = 2e3, 1e4
-#: seconds after which a question counts as not answered
+#: seconds of work after which a question counts as not answered, whatever else the machine does
 PATIENCE = 60
 #: what a message may not claim of a state that exists
 CLAIMS = re.compile(
@@ -344,9 +344,9 @@ def ask(member: Member) -> list[Answer]:
 
 
 def _ask(member: Member, control: str, load: Any, solver: str) -> Answer:
-    clock = time.perf_counter()
-    old = signal.signal(signal.SIGALRM, _ring)
-    signal.alarm(PATIENCE)
+    clock = time.process_time()
+    old = signal.signal(signal.SIGPROF, _ring)
+    signal.setitimer(signal.ITIMER_PROF, PATIENCE)
     eq, verdict, text = None, "", ""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -364,9 +364,9 @@ def _ask(member: Member, control: str, load: Any, solver: str) -> Answer:
         except Exception as error:
             verdict, text = "crashed", f"{type(error).__name__}: {str(error)[:200]}"
         finally:
-            signal.alarm(0)
-            signal.signal(signal.SIGALRM, old)
-    seconds = time.perf_counter() - clock
+            signal.setitimer(signal.ITIMER_PROF, 0)
+            signal.signal(signal.SIGPROF, old)
+    seconds = time.process_time() - clock
     if eq is None:
         return Answer(member, control, load, solver, verdict, text, seconds=seconds)
     verdict, text, other = judge(member, control, load, solver, eq)

@@ -24,6 +24,8 @@ NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
+#: pressure of a trial step from which on products are no numbers: the trial is refused
+_ABSURD = 1e150
 #: largest force of a correction of P, relative to the forces that meet at a node: a guess may have the right shape and a wrong P
 PRESSURE = 1e-9
 
@@ -132,7 +134,7 @@ class Equations:
         self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
         self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
-        self.finite = evaluation.finite and math.isfinite(pressure)
+        self.finite = evaluation.finite and abs(pressure) < _ABSURD
         self.bordered = bordered
         self._scales: tuple[float, float] | None = None
 

@@ -112,17 +112,27 @@ def _pulled_at_an_edge(potential: Potential, state: State, scene: Scene) -> str:
 
 
 def _pull_at_edges(potential: Potential, state: State) -> dict[float, float]:
-    """Radial part of the meridional stress at ends that nothing holds in their plane, over the largest stress: zero for a membrane."""
-    space, left = potential.space, {}
-    for k, support in enumerate(space.supports):
-        if space.on_axis[k] or "u" in support.held or potential.sources:
+    """Radial part of the meridional stress at ends that nothing holds in their plane, over the largest stress: zero for a membrane.
+
+    Where the stress hardly varies in the element of an end, nothing is computed for it: a pull that the mesh makes is a spike in there.
+    """
+    space = potential.space
+    left: dict[float, float] = {}
+    loose = [k for k, end in enumerate(space.supports) if not (space.on_axis[k] or "u" in end.held)]
+    if not loose or potential.sources:
+        return left
+    stress = state.evaluation.stress.reshape(2, *space.R.shape)
+    scale = float(max(stress.max(), -stress.min()))
+    for k in loose:
+        beside = stress[:, :, -k]
+        if not max(beside.max(axis=1) - beside.min(axis=1)) > _PULL * scale:
             continue
         end = space.ends[[-k]]
         (R, _), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
         u, u_s, _, w_s = space.displacement(state.x, end)
-        stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+        pull, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
         level = float((np.abs(R_s + u_s) / np.hypot(R_s + u_s, Z_s + w_s))[0])
-        left[float(R[0])] = abs(float(stress[0])) * level / float(np.abs(state.evaluation.stress).max() or 1.0)
+        left[float(R[0])] = abs(float(pull[0])) * level / scale
     return left
 
 

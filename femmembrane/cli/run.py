@@ -92,7 +92,7 @@ def _ended(scene: Scene, out: Path) -> int | None:
     if facts["status"] == Status.INTERRUPTED:
         return None
     if facts["equilibria"]:
-        finished(out)  # what is damaged is refused here, and not said to be done
+        finished(out, facts)  # what is damaged, or of another run, is refused here, and not said to be done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)

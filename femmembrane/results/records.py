@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status, printable
+from ..quantities import PLACES, words, written
 from ..solve.controls import control_kind
 from ..threads import one_thread
 from . import door
@@ -400,13 +401,13 @@ class Branch(Sequence[Equilibrium]):
     def __str__(self) -> str:
         classes = self.scene.analysis.stability or _SHOWN
         zones = self.scene.analysis.wrinkling is not None
-        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {'under ' + c:<14}" for c in classes)
+        head = " ".join([f"{'step':>4}", *(f"{words(name):>12}" for name in PLACES)]) + "".join(f"  {'under ' + c:<14}" for c in classes)
         head += "  zones" if zones else ""
         lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
-            numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
-            words = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
-            lines.append(numbers + words + (f"  {eq.zones().summary}" if zones else ""))
+            numbers = " ".join([f"{k:>4}", *(written(name, getattr(eq, name), 12) for name in PLACES)])
+            verdicts = "".join(f"  {eq.verdict(c).word:<14}" for c in classes)
+            lines.append(numbers + verdicts + (f"  {eq.zones().summary}" if zones else ""))
         lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)
 

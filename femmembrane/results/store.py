@@ -25,8 +25,8 @@ from .. import files
 from ..discretization.meridian import side
 from ..errors import InputError, Status
 from ..origin import package_version
+from ..quantities import quantity, typed
 from .error_estimate import ESTIMATED, ErrorEstimate, from_numbers
-from .quantities import QUANTITIES, typed
 from .verdict import Verdict
 
 if TYPE_CHECKING:
@@ -256,25 +256,8 @@ def _special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) 
 def _describe(name: str) -> dict[str, str]:
     prefix = next((p for p in (_SPECIAL, _LIMIT) if name.startswith(p)), "")
     base = name.removeprefix(prefix).removeprefix("equilibrium_")
-    known = QUANTITIES.get(base)
-    meaning, unit = (_about_verdict(base), "1") if known is None else (known.meaning, known.unit)
-    return {"long_name": meaning if base == name else f"{meaning}, at the special point", "units": unit}
-
-
-def _about_verdict(name: str) -> str:
-    """What a variable that belongs to a verdict means: its name ends in a control or in n and the number of waves."""
-    about = {
-        "lambda_error": "bound on the algebraic error of the smallest eigenvalue",
-        "lambda": "smallest eigenvalue, omega^2 rho_m R0^2/mu",
-        "verdict": "stability",
-        "negative_directions": f"number of negative eigenvalues ({_UNCOUNTED}: not counted)",
-        "reason": "reason of the verdict",
-        "mode": "shape of the smallest eigenvalue's mode (none: NaN)",
-    }
-    kind = next((k for k in about if name.startswith(k + "_")), "")
-    tag, _, part = name.removeprefix(kind + "_").partition("_")
-    against = f"azimuthal mode n = {tag[1:]}" if tag[1:].isdigit() else f"axisymmetric shapes under {tag} control"
-    return f"{about[kind]}, {against}" + (f": {part}" if part else "") if kind else name
+    known = quantity(base)
+    return {"long_name": known.meaning if base == name else f"{known.meaning}, at the special point", "units": known.unit}
 
 
 def _attributes(branch: Branch) -> dict[str, Any]:

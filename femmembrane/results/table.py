@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import files
 from ..errors import unknown_name
-from .quantities import typed
+from ..quantities import in_si, quantity, typed
 from .zones import KINDS
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def columns(branch: Branch) -> list[str]:
         *(f"lambda_{c}" for c in controls),
         *(f"verdict_{c}" for c in controls),
         *(f"lambda_n{n}" for n in scene.analysis.azimuthal_modes),
-        *(["pressure_pa"] if scene.scales else []),
+        *([in_si("pressure")] if scene.scales else []),
         *((f"fraction_{kind}" for kind in KINDS) if scene.analysis.wrinkling else ()),
         *(f"error_{name}" for name in estimated(scene)[1]),
         *("residual", "iterations", "seconds"),
@@ -72,8 +72,8 @@ def value(equilibrium: Equilibrium, step: int, column: str, held: str = "volume"
     if column == "status":
         return equilibrium.status.value
     scales = equilibrium.scene.scales
-    if column == "pressure_pa" and scales is not None:
-        return scales.to_si("pressure", equilibrium.pressure)
+    if column == in_si("pressure") and scales is not None:
+        return scales.to_si(quantity("pressure").si, equilibrium.pressure)
     if kind == "error":
         return float(getattr(equilibrium.error_estimate(held), name).relative)
     if kind == "fraction":

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
+from ..quantities import PLACES
 from ..results.records import Branch, Equilibrium, SoFar, SpecialPoint, TraceMemory
-from ..scene import QUANTITIES, Scene
+from ..scene import Scene
 from ..solve import state_resolution, wellposed
 from ..solve.continuation import BranchPoint, StepControl, Tracer, first_point, oriented_point, trace_points
 from ..solve.special_points import FOLDS, Located, Segment, branch_points, branches_crossing
@@ -204,7 +205,7 @@ def _targets(until: Mapping[str, float] | None) -> dict[str, float]:
         raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
     targets = dict(until or {})
     for quantity, value in targets.items():
-        choice("until", quantity, QUANTITIES)
+        choice("until", quantity, PLACES)
         targets[quantity] = number(f"until.{quantity}", value)
     return targets
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..files import remove_leftovers, replace_file, write_csv
+from ..quantities import in_si, si_values
 from .surroundings import place_of
 from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
@@ -89,14 +90,14 @@ def _write_csv(shown: Sequence[tuple[int, Equilibrium]], path: Path) -> list[Pat
     """One line a node: step, loads, and the profile."""
     names = [name for name in ("r", "rho", "eta", *FIELDS) if name in shown[0][1].profile()]
     scales = shown[0][1].scene.scales
-    in_m = [] if scales is None else [name for name in ("r", "rho", "eta") if name in names]
-    columns = [*names, *(f"{name}_m" for name in in_m)]
+    in_m = [] if scales is None else ["r", "rho", "eta"]
+    columns = [*names, *map(in_si, in_m)]
 
     def rows() -> Iterator[list[Any]]:
         for number, equilibrium in shown:
             profile = dict(equilibrium.profile())
             if scales is not None:
-                profile |= {f"{name}_m": scales.to_si("length", profile[name]) for name in in_m}
+                profile |= si_values({name: profile[name] for name in in_m}, scales)
             for node in zip(*(profile[name].tolist() for name in columns), strict=True):
                 yield [number, equilibrium.volume, equilibrium.pressure, *node]
 

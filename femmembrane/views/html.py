@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..results.quantities import heading
+from ..quantities import PLACES, heading, title
 
 if TYPE_CHECKING:
     from ..results.records import Branch, Equilibrium
@@ -59,15 +59,10 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
     """What an equilibrium is, with the verdicts that its scene asks for."""
     analysis = equilibrium.scene.analysis
-    energies = [("elastic energy", equilibrium.elastic_energy)]
-    energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []
+    scene = equilibrium.scene
+    energies = ["elastic_energy", *(["magnetic_energy"] if scene.sources else []), *(["load_energy"] if scene.loads else [])]
     return [
-        ("volume V", equilibrium.volume),
-        ("pressure P", equilibrium.pressure),
-        ("pole height", equilibrium.center_height),
-        *energies,
-        ("residual", equilibrium.residual),
-        ("status", equilibrium.status),
+        *((title(name), getattr(equilibrium, name)) for name in (*PLACES, *energies, "residual", "status")),
         *((f"under {control} control", equilibrium.verdict(control).reason) for control in analysis.stability),
         *((f"against n = {n}", equilibrium.verdict(azimuthal=n).reason) for n in analysis.azimuthal_modes),
         *([("zones", equilibrium.zones().summary)] if analysis.wrinkling else []),

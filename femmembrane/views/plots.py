@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
 from ..files import replace_file
-from ..results.quantities import PLACES, QUANTITIES
+from ..quantities import PLACES, axis_label, caption
 from .backend import drawing, load, title_text
 from .surroundings import Box, clamped_ends, surroundings
 from .vtk import smooth_profile
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-VOLUME_LABEL, PRESSURE_LABEL, HEIGHT_LABEL, RADIUS_LABEL = (QUANTITIES[name].label for name in (*PLACES, "rho"))
 _DPI = 160
 #: branches of up to so many equilibria show them as dots
 _DOTS = 40
@@ -128,8 +127,8 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
     # lightness falls along the map, so that neighbours differ in grey as well
     colors = colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2)))
     for equilibrium, color in zip(shown, colors, strict=False):
-        label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
-        draw_profile(axes, equilibrium, Style(label, _SOLID, color), zones=zones)
+        named = caption(equilibrium.volume, equilibrium.pressure, ",  ")
+        draw_profile(axes, equilibrium, Style(named, _SOLID, color), zones=zones)
     draw_surroundings(axes, shown)
     axes.set_anchor("W")  # the legend stands on the right
     handles, labels = legend_entries(axes)
@@ -166,9 +165,9 @@ def draw_zones(axes: Axes, branch: Branch) -> list[Any]:
     steps = np.diff(volume)
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
     handles = fill_zones(axes, branch, volume if monotone else np.arange(volume.size, dtype=float))
-    axes.set_xlabel(VOLUME_LABEL if monotone else "step")
+    axes.set_xlabel(axis_label("volume" if monotone else "step"))
     flat = "s" not in branch[0].profile()
-    axes.set_ylabel("reference radius r/R₀" if flat else "arc length of the reference meridian s/R₀")
+    axes.set_ylabel(axis_label("r" if flat else "s"))
     axes.margins(0)
     return list(handles)
 
@@ -276,8 +275,8 @@ def draw_branch(
     for key, name in (("across", across), ("up", up)):
         if name not in PLACES:
             raise unknown_name(key, name, PLACES)
-    axes.set_xlabel(QUANTITIES[across].label)
-    axes.set_ylabel(QUANTITIES[up].label)
+    axes.set_xlabel(axis_label(across))
+    axes.set_ylabel(axis_label(up))
     axes.grid(color="0.9", linewidth=0.6)
     points = _coordinates(branch, (across, up))
     gaps = _gaps(branch, (across, up))
@@ -426,9 +425,9 @@ def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_G
     order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), lost))
     for lost, line in lines:
         if lost:
-            label = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
+            named = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
             grey = str(max(0.84 - 0.14 * order.index(lost), 0.4))
-            axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=label)
+            axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=named)
 
 
 def _draw_wrinkling(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
@@ -453,10 +452,10 @@ def _draw_jumps(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
 def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
     points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit)]
     for kind in dict.fromkeys(str(p.kind) for p in points):
-        marker, label = MARKERS.get(kind, ("X", kind.replace("_", " ")))
+        marker, named = MARKERS.get(kind, ("X", kind.replace("_", " ")))
         places = _coordinates([p for p in points if str(p.kind) == kind], quantities)
         look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
-        axes.plot(*places.T, marker, label=new_label(axes, label), zorder=4, **look)
+        axes.plot(*places.T, marker, label=new_label(axes, named), zorder=4, **look)
     for point, place in zip(points, _coordinates(points, quantities), strict=True):
         if point.azimuthal:
             axes.annotate(f"n = {point.azimuthal}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, zorder=5)
@@ -483,8 +482,8 @@ def draw_profile(axes: Axes, equilibrium: Equilibrium, style: Style, *, zones: b
 
 def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium]) -> None:
     """What drawn meridians stand in: labelled axes of equal scale, the clamped ends, and the magnetic sources of their scene."""
-    axes.set_xlabel(RADIUS_LABEL)
-    axes.set_ylabel("height η/R₀")
+    axes.set_xlabel(axis_label("rho"))
+    axes.set_ylabel(axis_label("eta"))
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(nbins=6)
     for _, rho, eta in clamped_ends(shown[0]):

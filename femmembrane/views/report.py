@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import Status
 from ..files import replace_file
+from ..quantities import PLACES, axis_label, caption, heading, words
 from ..results.table import estimated
 from . import plots
 from .backend import load
@@ -129,9 +130,9 @@ class _Page:
         state = f'<p class="badge {"good" if good else "bad"}">{escape(str(branch.status))}</p>'
         tiles = [("equilibria", str(len(branch)))]
         if len(branch):
-            for name, column in (("volume V/R₀³", "volume"), ("pressure P", "pressure"), ("pole height η(0)/R₀", "center_height")):
-                values = branch.column(column)
-                tiles.append((name, f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
+            for name in PLACES:
+                values = branch.column(name)
+                tiles.append((axis_label(name), f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
             tiles.append(("largest residual", f"{branch.column('residual').max():.1e}".replace("-", "−")))  # noqa: RUF001
         shown = "".join(f'<div class="tile"><b>{value}</b><span>{escape(name)}</span></div>' for name, value in tiles)
         return f'{state}{message}<div class="tiles">{shown}</div>'
@@ -145,11 +146,11 @@ class _Page:
 
     def _branch(self) -> str:
         figures = []
-        for across, label in (("volume", "Pressure against volume"), ("center_height", "Pressure against pole height")):
+        for across in ("volume", "center_height"):
             figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
             plots.draw_branch(axes, self.branch, across=across)
             _legend_below(figure, axes)
-            figures.append(self._figure(figure, label))
+            figures.append(self._figure(figure, f"Pressure against {words(across)}"))
         return _beside(*figures) + self._special_points() + self._jumps()
 
     def _special_points(self) -> str:
@@ -162,14 +163,12 @@ class _Page:
         rows = [
             [
                 names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
-                p.volume,
-                p.pressure,
-                p.center_height,
+                *(getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
-        return table(["special point", "V", "P", "pole height", "relative error"], rows)
+        return table(["special point", *map(heading, PLACES), "relative error"], rows)
 
     def _jumps(self) -> str:
         rows = []
@@ -191,12 +190,12 @@ class _Page:
         if not classes:
             return ""
         rows = []
-        for name, words, _ in classes:
-            for word, steps in _runs(words):
+        for name, found, _ in classes:
+            for word, steps in _runs(found):
                 span = str(steps[0]) if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
                 rows.append([name, word, span, *(_span(self.branch.column(c)[steps]) for c in ("volume", "pressure"))])
         figure = self._figure(_eigenvalues(self.branch), "Smallest eigenvalues along the branch")
-        listed = table(["against", "verdict", "steps", "V", "P"], rows)
+        listed = table(["against", "verdict", "steps", heading("volume"), heading("pressure")], rows)
         return f"{_beside(figure, listed)}<h3>The last equilibrium</h3>{pairs((name, reason) for name, _, reason in classes)}"
 
     def _zones(self) -> str:
@@ -205,8 +204,10 @@ class _Page:
         runs = [steps for _, steps in _runs([", ".join(e.zones().kinds) for e in self.branch])]
         shown = [step for steps in runs for step in dict.fromkeys((steps[0], steps[-1]))][:MOST_ROWS]
         rows = [[step, self.branch[step].volume, self.branch[step].zones().summary] for step in shown]
-        caption = "First and last step with the same kinds of zones, and their parts of the reference area"
-        return _beside(self._figure(_zones(self.branch), "Taut and wrinkled zones"), table(["step", "V", "zones"], rows, caption=caption))
+        about = "First and last step with the same kinds of zones, and their parts of the reference area"
+        return _beside(
+            self._figure(_zones(self.branch), "Taut and wrinkled zones"), table(["step", heading("volume"), "zones"], rows, caption=about)
+        )
 
     def _errors(self) -> str:
         held, names = estimated(self.branch.scene)
@@ -307,8 +308,8 @@ def _profiles(branch: Branch) -> Figure:
     box = Box.of([equilibrium.profile() for equilibrium in shown])
     figure, axes = plots.new_figure((_WIDTH, 1.9 + _HEIGHT * min(0.85, (box.high - box.low) / (2 * box.radius))))  # round stays round
     for equilibrium, color in zip(shown, colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2))), strict=False):
-        label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
-        plots.draw_profile(axes, equilibrium, plots.Style(label, "-", color))
+        named = caption(equilibrium.volume, equilibrium.pressure, ",  ")
+        plots.draw_profile(axes, equilibrium, plots.Style(named, "-", color))
     plots.draw_surroundings(axes, shown)
     _legend_below(figure, axes)
     return figure
@@ -327,7 +328,7 @@ def _along(equilibrium: Equilibrium, names: tuple[str, ...]) -> Figure:
         way = {"1": "along the meridian", "2": "around the axis"}[name[-1]]
         kind = name[:-2].replace("_", " ")
         axes.plot(profile.get("s", profile["r"]), profile[name], linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
-    axes.set_xlabel("arc length of the reference meridian s/R₀" if "s" in profile else "reference radius R/R₀")
+    axes.set_xlabel(axis_label("s" if "s" in profile else "r"))
     axes.grid(color="0.9", linewidth=0.6)
     if profile[names[0]].min() < 0 or min(profile[name].min() for name in names) < 0:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
@@ -339,16 +340,16 @@ def _eigenvalues(branch: Branch) -> Figure:
     """Smallest eigenvalues along the branch, on a scale that is linear around zero."""
     figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
     analysis = branch.scene.analysis
-    names = [*((f"{c} held", f"lambda_{c}") for c in analysis.stability), *((f"n = {n}", f"lambda_n{n}") for n in analysis.azimuthal_modes)]
-    values = {label: branch.column(name) for label, name in names}
+    names = [*(f"lambda_{c}" for c in analysis.stability), *(f"lambda_n{n}" for n in analysis.azimuthal_modes)]
+    values = {axis_label(name): branch.column(name) for name in names}
     known = np.concatenate([v[np.isfinite(v)] for v in values.values()])
-    for k, (label, value) in enumerate(values.items()):
-        _draw_steps(axes, branch, value, k, f"λ, {label}")
+    for k, (named, value) in enumerate(values.items()):
+        _draw_steps(axes, branch, value, k, named)
     axes.axhline(0, color="0.4", linewidth=0.8, zorder=0)
     usual = float(np.median(np.abs(known))) if known.size else 0.0
     if usual and np.abs(known).max() > 30 * usual:
         axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
-    axes.set_ylabel("smallest eigenvalue λ")
+    axes.set_ylabel(axis_label("lambda"))
     axes.grid(color="0.9", linewidth=0.6)
     _legend_below(figure, axes, columns=2)
     return figure
@@ -382,12 +383,12 @@ def _error_curves(branch: Branch, errors: Mapping[str, Array]) -> Figure:
     return figure
 
 
-def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, label: str) -> None:
+def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, named: str) -> None:
     """A quantity against the step, with a gap where the membrane snaps."""
     breaks = [0, *(jump.index for jump in branch.jumps), len(branch)]
     look: dict[str, Any] = {"linestyle": _DASHES[kind % 4], "color": _COLORS[kind % 4], "linewidth": 1.8}
     for first, last in pairwise(breaks):
         steps = np.arange(first, last)
-        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, label), **look)
-    axes.set_xlabel("step")
+        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, named), **look)
+    axes.set_xlabel(axis_label("step"))
     axes.xaxis.get_major_locator().set_params(integer=True)

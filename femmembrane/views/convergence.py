@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import unknown_name
 from ..quantities import axis_label
 from ..results.convergence import RESOLVED, Convergence
-from .plots import new_figure, save_figure
+from .figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..quantities import axis_label, heading
 from .backend import title_text
-from .plots import new_figure, save_figure
+from .figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -120,6 +120,7 @@ def _write_stl(equilibrium: Equilibrium, path: Path) -> None:
 
 
 def _write_obj(equilibrium: Equilibrium, path: Path) -> None:
+    # meshio writes the time of day into the file, so that the same run would not give the same bytes
     points, revolution = _surface(equilibrium)
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
     lines += [
@@ -140,7 +141,10 @@ def _write_pvd(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
 
 
 def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
-    """A collection in time, one grid an equilibrium: common cells, own points and point data."""
+    """A collection in time, one grid an equilibrium: common cells, own points and point data.
+
+    The writer of meshio has the points of one mesh for all times, and puts its HDF5 file into the working directory.
+    """
     import h5py
 
     numbers, grids = path.with_suffix(".h5"), []

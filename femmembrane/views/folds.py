@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..files import replace_file
 from ..quantities import axis_label, key_label
 from ..results.folds import FOLD_NAMES, FoldCurve
-from .backend import drawing, load, title_text
+from .backend import load, title_text
+from .figures import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,10 +42,7 @@ def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -
         axes.set_ylabel(f"at the fold: {axis_label(name)}")
     panels[-1].set_xlabel(key_label(curve.parameter))
     panels[0].legend(fontsize=9, framealpha=0.9, edgecolor="none")
-    if path is not None:
-        with replace_file(path) as temporary, drawing():
-            figure.savefig(temporary, dpi=160)
-    return figure
+    return save_figure(figure, path)
 
 
 def _draw(axes: Axes, curve: FoldCurve, name: str) -> None:

@@ -16,7 +16,7 @@ from ..errors import InputError, Status, unknown_name
 from ..quantities import axis_label, key_label
 from ..results.grid import DIMENSIONS, place_of_variable
 from .backend import title_text
-from .plots import new_figure, save_figure
+from .figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from .folders import finished
 from .outcome import DONE, say
 
 if TYPE_CHECKING:
-    from ..results.records import Branch
+    from ..results.branch import Branch
 
 
 def report(folder: Path, /, *, out: Path | None = None) -> int:
@@ -50,7 +50,7 @@ def write(folder: Path, out: Path | None = None) -> Path:
 
 def _without_equilibria(facts: dict[str, Any]) -> Branch:
     """The branch of a run that found nothing and so left no other file."""
-    from ..results.records import Branch
+    from ..results.branch import Branch
     from ..scene import Scene
 
     try:

@@ -22,8 +22,9 @@ from ..errors import InputError, SolveError, unknown_name
 from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version, processor
 from ..potential import potential_of
+from ..results.branch import Branch
 from ..results.cost import STARTS, Cost, Measurement
-from ..results.records import Branch, Equilibrium
+from ..results.equilibrium import Equilibrium
 from ..results.store import save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene

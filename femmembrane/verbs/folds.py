@@ -11,8 +11,9 @@ import numpy as np
 from ..checks import sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Evaluation, Family, Potential, potential_of
+from ..results.equilibrium import Equilibrium
 from ..results.folds import Cusp, FoldCurve
-from ..results.records import Equilibrium, SpecialPoint
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..scene.variation import Parameter
 from ..solve import state_resolution, wellposed

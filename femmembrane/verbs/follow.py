@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from ..checks import number, only
 from ..errors import InputError, SolveError
+from ..results.branch import Branch
 from ..results.checkpoint import same_scene
-from ..results.records import Branch, Equilibrium
+from ..results.equilibrium import Equilibrium
 from ..scene import Scene
 from ..solve.controls import CONTROLS, Controlled, Gas, control_kind
 from ..threads import one_thread

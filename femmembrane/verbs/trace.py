@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ..errors import SolveError, Status
-from ..results.records import Branch, Equilibrium, SpecialPoint
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..solve.continuation import StepControl
 from ..threads import one_thread

@@ -10,7 +10,7 @@ from .base import Cell, EquilibriumAnalysis
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Equilibrium
+    from ..equilibrium import Equilibrium
 
 
 class Pascals(EquilibriumAnalysis):

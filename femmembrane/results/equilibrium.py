@@ -1,18 +1,17 @@
-"""Frozen records of what was computed: equilibria, special points and branches."""
+"""One equilibrium of a scene: what was computed, and the door to all that may be asked of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
-from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
-from ..errors import InputError, Status, printable
+from ..errors import InputError, Status
 from ..scene import WRINKLING
 from ..solve.controls import control_kind
 from ..threads import one_thread
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from .error_estimate import ErrorEstimate
     from .verdict import Verdict
     from .vibration import Vibration
-    from .zones import Zones, ZonesAlong
+    from .zones import Zones
 
 Array = NDArray[np.float64]
 
@@ -266,292 +265,6 @@ class Equilibrium:
     def _repr_html_(self) -> str:
         """Numbers and verdicts with the deformed meridian, for notebooks."""
         return door.equilibrium_html(self)
-
-
-@dataclass(frozen=True, eq=False)
-class SpecialPoint:
-    """A point of a branch where something changes.
-
-    Attributes
-    ----------
-    kind : str
-        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset.
-    volume, pressure, center_height : float
-        Of its equilibrium.
-    error : float
-        Estimated relative distance of the located point from the exact point of the discrete branch.
-    equilibrium : Equilibrium
-    azimuthal : int
-        For an azimuthal onset: the number of waves against which stability is lost or regained there.
-    tangent : ndarray, shape (n_free + 1,), or None
-        For a branch point: the direction in (x, P) of the branch on which it was found. It tells this branch from the crossing one.
-    """
-
-    kind: str
-    volume: float
-    pressure: float
-    center_height: float
-    error: float
-    equilibrium: Equilibrium = field(repr=False)
-    azimuthal: int = field(default=0, kw_only=True)
-    tangent: Array | None = field(default=None, repr=False, kw_only=True)
-
-
-@dataclass(frozen=True, eq=False)
-class PathMemory:
-    """What the next equilibrium of a run depends on besides the last one. With it an interrupted run goes on as if it had not stopped.
-
-    Attributes
-    ----------
-    sigma : tuple of float
-        Load (in a trace: arc length) at the last points that predict the next one, two at most.
-    points, slopes : ndarray, shape (len(sigma), n_free + 1)
-        (x, P) and its derivative with respect to sigma there.
-    """
-
-    sigma: tuple[float, ...]
-    points: Array
-    slopes: Array
-
-
-@dataclass(frozen=True, eq=False)
-class TraceMemory(PathMemory):
-    """The same for a trace by arc length.
-
-    Attributes
-    ----------
-    step : float
-        Length of the next step.
-    regular : int
-        Number of equilibria that are steps of the trace; one more may be the end point that was asked for.
-    unexplained : tuple of str
-        Changes of inertia met so far at which no special point was located.
-    known : float
-        Relative size of the last correction of the point from which the next step sets out.
-    """
-
-    step: float
-    regular: int
-    unexplained: tuple[str, ...] = ()
-    known: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Jump:
-    """A snap of a run from one part of the branch to another, or to another branch.
-
-    Attributes
-    ----------
-    index : int
-        Position in the branch of the equilibrium landed on.
-    limit : SpecialPoint or None
-        The fold at which the branch turned back before the load, or the branch point at which it lost its stability. From a branch point
-        another branch leads to the landing.
-    landing : Equilibrium
-    """
-
-    index: int
-    limit: SpecialPoint | None
-    landing: Equilibrium
-
-
-class SoFar(Sequence[Equilibrium]):
-    """The equilibria that a growing list has now. It is taken after each step of a run, where copies would cost a time quadratic in the
-    steps."""
-
-    def __init__(self, growing: list[Equilibrium]) -> None:
-        self._growing, self._count = growing, len(growing)
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, index: int) -> Equilibrium: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Equilibrium, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> Equilibrium | tuple[Equilibrium, ...]:
-        places = range(self._count)[index]
-        return self._growing[places] if isinstance(places, int) else tuple(self._growing[k] for k in places)
-
-
-@dataclass(frozen=True, eq=False)
-class Branch(Sequence[Equilibrium]):
-    """Equilibria in the order in which they were found. A branch is a sequence: it has a length, items and slices.
-
-    Attributes
-    ----------
-    scene : Scene
-    equilibria : sequence of Equilibrium
-    status : Status
-        How the run ended.
-    message : str
-        Why it ended before it was finished; empty when all went well.
-    timings : mapping of str to float
-        Seconds by stage.
-    special_points : tuple of SpecialPoint, or None
-        None when special points were not looked for.
-    memory : TraceMemory, PathMemory or None
-        What is needed to go on: a TraceMemory for a branch traced by arc length, a PathMemory for an unfinished run by loads.
-    jumps : tuple of Jump
-        Where a run snapped because the branch turned back before a load, or lost its stability at a branch point.
-    solver : str
-        Which solver found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
-    remarks : tuple of str
-        Remarks on how the run went on, for instance that another processor began it.
-
-    Examples
-    --------
-    >>> import femmembrane as fm
-    >>> branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volumes=[0.5, 1.0, 2.0])
-    >>> len(branch), branch.status.value, round(branch[-1].pressure, 4)
-    (3, 'converged', 1.8025)
-    >>> [round(float(height), 4) for height in branch.column("center_height")]
-    [0.298, 0.5528, 0.94]
-    """
-
-    scene: Scene
-    equilibria: Sequence[Equilibrium]
-    status: Status = Status.CONVERGED
-    message: str = ""
-    timings: Mapping[str, float] = field(default_factory=dict)
-    special_points: tuple[SpecialPoint, ...] | None = None
-    memory: PathMemory | None = field(default=None, repr=False)
-    jumps: tuple[Jump, ...] = ()
-    solver: str = ""
-    remarks: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.equilibria)
-
-    @overload
-    def __getitem__(self, index: int) -> Equilibrium: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> Branch: ...
-
-    def __getitem__(self, index: int | slice) -> Equilibrium | Branch:
-        if isinstance(index, slice):
-            return replace(self, equilibria=self.equilibria[index], special_points=None, memory=None, jumps=())
-        return self.equilibria[index]
-
-    def __iter__(self) -> Iterator[Equilibrium]:
-        return iter(self.equilibria)
-
-    def column(self, name: str) -> NDArray[Any]:
-        """One column of the table.
-
-        Parameters
-        ----------
-        name : str
-            ``step``, ``status``, any column of the table or an energy. ``lambda_`` or ``verdict_`` is followed by pressure, volume, n1, n2,
-            ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for error estimates (relative errors at
-            the load that its [run] prescribes, else at the volume). A scene with scales has ``pressure_pa`` as well.
-
-        Raises
-        ------
-        InputError
-            For an unknown name.
-        """
-        from .table import column
-
-        return column(self, name)
-
-    def __str__(self) -> str:
-        from .analyses import printed
-
-        columns = printed(self.scene)
-        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {c.heading:<{c.width}}" for c in columns)
-        lines = [printable(self.scene.title), head] if self.scene.title else [head]
-        for k, eq in enumerate(self):
-            numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
-            lines.append(numbers + "".join(f"  {c.text(eq):<{c.width}}" for c in columns))
-        lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
-        return "\n".join(line.rstrip() for line in lines)
-
-    @property
-    def mesh_used(self) -> str:
-        """The mesh that was chosen for an accuracy, in words; empty for one that was given."""
-        mesh, degree = self.scene.mesh, self.scene.degree
-        accuracy, estimated = (getattr(mesh, name, None) for name in ("accuracy", "estimated"))
-        if accuracy is None or estimated is None:
-            return ""
-        return f"mesh: {mesh.elements} elements of degree {degree}, graded, chosen for accuracy {accuracy:g}, estimated {estimated:.0e}"
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """The remarks, what was repaired in the points of the mesh, and what was done about motions of the whole that nothing resists."""
-        from ..discretization.space import space_of_scene
-
-        repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
-        return self.remarks if self.scene.open else (*self.remarks, *repaired, *space_of_scene(self.scene).notes)
-
-    def zones_along(self) -> ZonesAlong:
-        """Zones of all equilibria and, where their kinds change from one to the next, of states between them."""
-        return door.zones_along(self)
-
-    def to_dataframe(self) -> Any:
-        """The table as a pandas DataFrame."""
-        from .table import to_dataframe
-
-        return to_dataframe(self)
-
-    def to_xarray(self) -> Any:
-        """Table, profiles and states as an xarray Dataset with units and long names."""
-        from .store import to_xarray
-
-        return to_xarray(self)
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write everything to one NetCDF file; :func:`femmembrane.load` reads it back.
-
-        Parameters
-        ----------
-        path : path
-        """
-        from .store import save
-
-        save(self, path)
-
-    def to_vtk(self, path: str | PathLike[str]) -> None:
-        """Write a ParaView collection (.pvd) with one VTU file a step.
-
-        Parameters
-        ----------
-        path : path
-            With the suffix ``.pvd``.
-        """
-        door.write_vtk(self, path)
-
-    def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Pressure against volume as a Matplotlib figure.
-
-        Parameters
-        ----------
-        path : path, optional
-            Where the figure is also written.
-        """
-        return door.plot_pressure_volume(self, path)
-
-    def report(self, path: str | PathLike[str]) -> None:
-        """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings.
-
-        Parameters
-        ----------
-        path : path
-        """
-        door.write_report(self, path)
-
-    def cite(self) -> str:
-        """BibTeX of what the computation used."""
-        from .citations import cite
-
-        return cite(self)
-
-    def _repr_html_(self) -> str:
-        """The table and the pressure-volume diagram, for notebooks."""
-        return door.branch_html(self)
 
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:

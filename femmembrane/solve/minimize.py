@@ -22,7 +22,7 @@ from ..potential.replay import vectorise
 from ..threads import Guard
 from .banded import negative_directions
 from .controls import Control, PressureControl, VolumeControl
-from .newton import NewtonResult, correct
+from .newton import NewtonResult, correct, displaced
 from .state import distance
 
 #: two states closer than this are the same, relative to the size of the displacement
@@ -74,6 +74,8 @@ def minimize(
     """
     evaluation = evaluation or potential.evaluate(x, pressure, magnetic)
     scale_u, scale_w = (float(np.abs(x[index]).max(initial=0.0)) or 1.0 for index in potential.space.fields)
+    if potential.space.strained:  # stiff in both directions, so that one length measures both
+        scale_u = scale_w = max(displaced(potential, x))
     scales = np.empty_like(x)
     scales[potential.space.fields[0]], scales[potential.space.fields[1]] = scale_u, scale_w
     objective = float(np.abs(scales * evaluation.gradient).max(initial=0.0)) or 1.0

@@ -223,6 +223,14 @@ class Numbering:
         return float(np.abs(u).max()), float(np.abs(w).max())
 
     @cached_property
+    def lift_mean(self) -> float:
+        """Root mean square over the reference area, in units of the membrane's own size, of the displacements in :attr:`lift_size`."""
+        if self.lift is None or not self.strained:
+            return 0.0
+        u, _, w, _ = self.lift.at(self.mesh, self.s)
+        return float(np.sqrt((self.area_weights * (u**2 + w**2)).sum() / self.reference_area)) / self.unit
+
+    @cached_property
     def lifted(self) -> tuple[Array, Array, Array, Array]:
         """(rho, rho_x, eta, eta_x) at the quadrature points while all unknowns are zero."""
         if self.lift is None:

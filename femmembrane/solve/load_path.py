@@ -19,7 +19,7 @@ from .start import cold_start, moderate
 from .state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from .state_resolution import refuse_unresolved
 from .stepping import Corrector, march
-from .wellposed import slackness, unresolved_source
+from .wellposed import ill_posed, slackness, unresolved_source
 
 #: who solves, by the public name
 SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
@@ -199,6 +199,9 @@ class LoadPath:
         ):
             return guess, None  # a limit point at this very pressure, which no corrector finds under pressure control
         if result.status is Status.NOT_A_MINIMUM:
+            if self.potential.space.strained and (bad := ill_posed(self.potential, guess.evaluation)) is not None:
+                where = f"in the state found there (V = {guess.volume:.6g}, P = {guess.pressure:.6g}) {bad}"
+                raise SolveError(where, status=bad.status)
             turn = self._lost(guess, load)
             if jump and turn.limit.landing is not None:
                 return turn.limit.landing, turn

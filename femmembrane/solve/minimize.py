@@ -23,7 +23,7 @@ from ..threads import Guard
 from .banded import negative_directions
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, displaced
-from .state import distance
+from .state import displacement, distance
 
 #: two states closer than this are the same, relative to the size of the displacement
 SAME = 1e-6
@@ -175,7 +175,7 @@ def _on_branch_of_guess(
     Where the branch is unstable a minimiser may stay on it, or go downhill to another branch: round-off and the mesh decide.
     """
     own = correct(potential, control, x, pressure, magnetic=magnetic)
-    if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * distance(potential, found.x, np.zeros_like(x)):
+    if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * displacement(potential, found.x):
         return found
     return own if distance(potential, own.x, x) < distance(potential, found.x, x) else found
 

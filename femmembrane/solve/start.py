@@ -32,7 +32,7 @@ from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
 from .newton import NEGLIGIBLE, correct
 from .segment import Segment
-from .state import Predictor, State, at_rest, distance, flat_state
+from .state import Predictor, State, at_rest, displacement, distance, flat_state
 from .state_resolution import unresolved
 from .stepping import march
 from .wellposed import ill_posed, is_slack, slackness, unresolved_source
@@ -65,15 +65,19 @@ def unloaded(potential: Potential) -> State | None:
 
     None where they are held where they rest, where that state was not found, and where it is compressed: it is no place to start from.
     """
+    state = _without_load(potential)
+    return state if state is not None and _sound(state) else None
+
+
+def _without_load(potential: Potential) -> State | None:
+    """As :func:`unloaded`, whether it is compressed or not."""
     if not potential.space.strained or potential.space.loose:
         return None
     control, x = PressureControl(0.0), np.zeros(potential.space.n_free)
     result = correct(potential, control, x, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
     if result.status is Status.CONVERGED:
-        state: State | None = State.of(result)
-    else:
-        state = follow_homotopy(Held(potential, control, x, 0.0, magnetic=0.0), x, 0.0)
-    return state if state is not None and _sound(state) else None
+        return State.of(result)
+    return follow_homotopy(Held(potential, control, x, 0.0, magnetic=0.0), x, 0.0)
 
 
 def usual_volume(potential: Potential) -> float:
@@ -102,6 +106,8 @@ def cold_start(potential: Potential, held: Controlled, load: float, *, stable: b
     SolveError
         When none of the ways arrives.
     """
+    if not potential.surrounded and (state := _without_load(potential)) is not None and state.value_of(held) == load:
+        return state  # under tension as any other; one that is compressed is what there is without load
     if isinstance(held, Gas):
         return start_in_gas(potential, held.at(load))
     if held is CONTROLS["pressure"]:
@@ -526,7 +532,7 @@ def _well_posed(state: State) -> bool:
 
 def _same(a: State, b: State) -> bool:
     potential = a.evaluation.potential
-    return a.x.shape == b.x.shape and distance(potential, a.x, b.x) <= _SAME * distance(potential, a.x, np.zeros_like(a.x))
+    return a.x.shape == b.x.shape and distance(potential, a.x, b.x) <= _SAME * displacement(potential, a.x)
 
 
 def _sound(state: State) -> bool:

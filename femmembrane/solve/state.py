@@ -91,6 +91,12 @@ def distance(potential: Potential, x: Array, y: Array) -> float:
     return float(np.sqrt(max(inner(potential, d, 0.0, d, 0.0), 0.0)))
 
 
+def displacement(potential: Potential, x: Array) -> float:
+    """Root mean square of a displacement, or of that which the places of the ends make where it is larger, in units as :func:`distance`."""
+    own = distance(potential, x, np.zeros_like(x))
+    return own if potential.space.lift is None else max(own, potential.space.lift_mean)
+
+
 @dataclass(slots=True)
 class Predictor:
     """The last two points of a path z(sigma) with their derivatives: predicts by cubic Hermite extrapolation."""

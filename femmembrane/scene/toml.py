@@ -37,7 +37,8 @@ from ..discretization.mesh_files import Curve, read_meridian
 from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
-from ..physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
+from ..physics.invariant import ArrudaBoyce, ExtendedTube, Fung, Gent, LopezPamies, Yeoh
+from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
 from ..physics.loads import HubForce, Hydrostatic, Weight
 from ..physics.magnetics import Dipole
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
@@ -52,12 +53,17 @@ if TYPE_CHECKING:
 
 MATERIALS: dict[str, Any] = {
     "arruda-boyce": ArrudaBoyce,
+    "extended-tube": ExtendedTube,
     "fung": Fung,
     "gent": Gent,
+    "gent-gent": GentGent,
+    "lopez-pamies": LopezPamies,
     "mooney-rivlin": MooneyRivlin,
     "neo-hookean": NeoHookean,
     "ogden": Ogden,
+    "polynomial": Polynomial,
     "varga": Varga,
+    "veronda-westmann": VerondaWestmann,
     "yeoh": Yeoh,
 }
 SOURCES: dict[str, Any] = {

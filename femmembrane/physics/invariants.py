@@ -109,7 +109,8 @@ _POWERS = {f"c{i}{k}": (i, k) for i, k in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2
 class Polynomial(InvariantsMaterial):
     """Polynomial strain energy W = sum of c_ik J^i K^k with J = I_1 - 3, K = I_2 - 3 (Rivlin and Saunders 1951).
 
-    Phil. Trans. R. Soc. A 243 (1951). With c10, c01 and c11 it is the Mooney-Rivlin material of three terms, with c20 and c02 as well that of five, with all that of nine.
+    Phil. Trans. R. Soc. A 243 (1951). With c10, c01 and c11 it is the Mooney-Rivlin material of three terms, with c20 and c02 as well that
+    of five, with all that of nine.
 
     Parameters
     ----------

@@ -321,6 +321,41 @@ def test_scene_files(tmp_path):
         fm.Scene.from_dict({"material": {"model": "gnet"}})
 
 
+def test_another_convention_of_ogden(tmp_path):
+    """W = sum 2 mu_k/alpha_k^2 (sum of l_i^alpha_k - 3) is the same rubber; negative exponents have positive moduli there."""
+    mu, alpha = (0.6, 0.3, 0.1), (1.3, 5.0, -2.0)
+    other = fm.Ogden(mu, alpha, convention="2mu/alpha^2")
+    assert other == fm.Ogden(tuple(2 * m / a for m, a in zip(mu, alpha, strict=True)), alpha)
+    e1, e2 = 0.4, 0.1
+    strains = np.array([e1, e2, -e1 - e2])
+    expected = sum(2 * m / a**2 * (np.exp(a * strains).sum() - 3) for m, a in zip(mu, alpha, strict=True))
+    assert other.energy(e1, e2) == pytest.approx(expected, rel=1e-12)
+    table = {"model": "ogden", "mu": list(mu), "alpha": list(alpha), "convention": "2mu/alpha^2"}
+    scene = fm.Scene.from_dict({"material": table})
+    assert scene.material == other
+    scene.to_toml(tmp_path / "scene.toml")  # in the default convention
+    assert fm.Scene.from_toml(tmp_path / "scene.toml") == scene
+    assert "convention" not in fm.Scene.to_dict(scene)["material"]
+
+
+@pytest.mark.parametrize(
+    ("mu", "alpha", "convention", "message"),
+    [
+        ((0.9, 0.1), (1.3, -2.0), None, r"material.mu\[1\] = 0.1: mu alpha > 0 .* say convention = \"2mu/alpha\^2\""),
+        ((1.4, 0.1, -0.1), (1.3, -2.0, 3.0), None, r"material.mu\[1\] = 0.1: .*alpha = -2.0$"),
+        ((0.6, 0.4), (1.3, 5.0), None, r"the sum of mu is 1, .*: say convention = \"2mu/alpha\^2\", or divide mu by 1.39$"),
+        ((4e5,), (2.0,), None, r"not 800000; divide mu by 400000, .*scales.shear_modulus = 400000"),
+        ((3e5, 1e5), (1.3, -2.0), "2mu/alpha^2", r"the sum of mu must be 1 .*, not 400000; divide mu by 400000, .*scales.shear_modulus"),
+        ((1.1, -0.1), (1.3, -2.0), "2mu/alpha^2", r"material.mu\[1\] = -0.1: mu > 0 is required"),
+        ((1.0,), (2.0,), "abaqus", r"material.convention = 'abaqus'"),
+        ((1.0,), (0.0,), None, r"material.alpha = \(0.0,\): exponents other than 0"),
+    ],
+)
+def test_moduli_in_the_wrong_convention_are_told_so(mu, alpha, convention, message):
+    with pytest.raises(fm.InputError, match=message):
+        fm.Ogden(mu, alpha) if convention is None else fm.Ogden(mu, alpha, convention)
+
+
 def test_treloar():
     """The paper's table 1 is Ogden's fit of 1972 over its shear modulus, with three or four digits."""
     material = fm.Ogden.treloar()

@@ -20,6 +20,7 @@ from .errors import FemmembraneError as FemmembraneError
 from .errors import InputError as InputError
 from .errors import SolveError as SolveError
 from .errors import Status as Status
+from .physics.hooke import Hooke as Hooke
 from .physics.invariant import ArrudaBoyce as ArrudaBoyce
 from .physics.invariant import ExtendedTube as ExtendedTube
 from .physics.invariant import Fung as Fung

@@ -37,6 +37,7 @@ from ..discretization.mesh_files import Curve, read_meridian
 from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
+from ..physics.hooke import Hooke
 from ..physics.invariant import ArrudaBoyce, ExtendedTube, Fung, Gent, LopezPamies, Yeoh
 from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
 from ..physics.loads import HubForce, Hydrostatic, Weight
@@ -57,6 +58,7 @@ MATERIALS: dict[str, Any] = {
     "fung": Fung,
     "gent": Gent,
     "gent-gent": GentGent,
+    "hooke": Hooke,
     "lopez-pamies": LopezPamies,
     "mooney-rivlin": MooneyRivlin,
     "neo-hookean": NeoHookean,

@@ -198,6 +198,11 @@ class Potential:
         return bool(self.sources or self.loads)
 
     @property
+    def prestressed(self) -> bool:
+        """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
+        return bool(getattr(self.scene.material, "prestressed", False))
+
+    @property
     def material(self) -> Material:
         """The strain energy of the membrane: the scene's material, or its tension field."""
         return strain_energy(self.scene.material, self.scene.tension_field)

@@ -183,6 +183,9 @@ class Equations:
     def size(self) -> float:
         """:func:`relative_size` of the correction, less that of a component which is zero but for round-off and in balance to round-off."""
         change, size = self._change, self._size
+        if self.potential.prestressed:  # the stress at rest makes forces whose round-off is that of the membrane's own size
+            unit = self.potential.space.unit
+            size = max(size[0], unit), size[1] if self.potential.flat else max(size[1], unit)
         worst = _relative(change, size)
         if TOLERANCE < worst < math.inf:
             small = NEGLIGIBLE * max(*size, *change)

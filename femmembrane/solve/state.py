@@ -55,8 +55,9 @@ class State:
 
 
 def rests_flat(potential: Potential) -> bool:
-    """Whether the undeformed membrane is an equilibrium without load: nothing pulls at it."""
-    return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
+    """Whether the undeformed membrane is an equilibrium without load: nothing pulls at it, its own stress at rest included."""
+    calm = not potential.surrounded and (potential.flat or not potential.prestressed)
+    return calm or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
 
 
 def at_rest(potential: Potential, held: Controlled, load: float) -> bool:

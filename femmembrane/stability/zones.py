@@ -13,8 +13,8 @@ field the mechanical stress across wrinkles is exactly zero; there the strain be
 
     g_1 = e_1 + max(e_2, 0)/2,      g_2 = e_2 + max(e_1, 0)/2
 
-It vanishes where the membrane stops being taut, as the stress of the plain material does. (A compressible material has a natural width of its
-own in place of -e/2.)
+It vanishes where the membrane stops being taut, as the stress of the plain material does. (A compressible material has its own
+natural width in place of -e/2.)
 """
 
 from __future__ import annotations

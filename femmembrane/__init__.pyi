@@ -20,10 +20,16 @@ from .errors import FemmembraneError as FemmembraneError
 from .errors import InputError as InputError
 from .errors import SolveError as SolveError
 from .errors import Status as Status
+from .physics.hooke import Hooke as Hooke
 from .physics.invariant import ArrudaBoyce as ArrudaBoyce
+from .physics.invariant import ExtendedTube as ExtendedTube
 from .physics.invariant import Fung as Fung
 from .physics.invariant import Gent as Gent
+from .physics.invariant import LopezPamies as LopezPamies
 from .physics.invariant import Yeoh as Yeoh
+from .physics.invariants import GentGent as GentGent
+from .physics.invariants import Polynomial as Polynomial
+from .physics.invariants import VerondaWestmann as VerondaWestmann
 from .physics.loads import HubForce as HubForce
 from .physics.loads import Hydrostatic as Hydrostatic
 from .physics.loads import Load as Load

@@ -5,6 +5,7 @@ With p_i = expm1(2 e_i), J is a product form without cancellation (:class:`.mate
     dJ/de_1 = 2 (p_1 - p_3)        s_i = f' dJ/de_i        d(s_i)/d(e_j) = f'' dJ/de_i dJ/de_j + f' d^2 J/(de_i de_j)
 
 The Baker-Ericksen inequality (1954), (s_1 - s_2)/(lambda_1 - lambda_2) > 0, means f'(J) > 0 at every J >= 0. Every class below demands it.
+(The extended tube adds a term of Ogden's, which satisfies it by itself.)
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import convert
+from ..checks import SMALLEST, between, convert, number, store
 from ..errors import InputError
-from .materials import NeoHookean
+from .materials import NeoHookean, Ogden
 
 _DOUBLE = NeoHookean()  # J/2, with its derivatives
 
@@ -191,3 +192,145 @@ class Fung(InvariantMaterial):
     def function(self, J: Any) -> tuple[Any, Any, Any]:
         slope = np.exp(self.b * J) / 2
         return np.expm1(self.b * J) / (2 * self.b), slope, self.b * slope
+
+
+@dataclass(frozen=True)
+class LopezPamies(InvariantMaterial):
+    """Lopez-Pamies' strain energy with one or two terms (Lopez-Pamies, C. R. Mecanique 338, 2010).
+
+    W = sum_k mu_k 3^(1 - alpha_k)/(2 alpha_k) (I_1^alpha_k - 3^alpha_k) with mu_1 + mu_2 = 1, the shear modulus.
+
+    Parameters
+    ----------
+    alpha1 : float
+        Exponent of the first term, not 0; 1 is neo-Hookean.
+    alpha2 : float
+        Exponent of the second term, not 0.
+    share : float
+        mu_2/(mu_1 + mu_2), at least 0 and below 1. Left out: 0, and the first term is alone.
+
+    Raises
+    ------
+    InputError
+        For an exponent of 0, or a share outside its bounds: with a negative modulus the stress would not grow with the stretch.
+
+    Examples
+    --------
+    Half of the modulus with an exponent of 3 stiffens the rubber at equal stretches of 2:
+
+    >>> from math import log
+    >>> import femmembrane as fm
+    >>> [round(float(fm.LopezPamies(1.0, 3.0, share).stress(log(2), log(2))[0]), 4) for share in (0.0, 0.5)]
+    [3.9375, 16.1884]
+    """
+
+    alpha1: float
+    alpha2: float = 1.0
+    share: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("alpha1", "alpha2"):
+            convert(self, f"material.{name}", "a finite number other than 0 is allowed")
+            if getattr(self, name) == 0:
+                raise InputError(f"material.{name}", 0.0, "a finite number other than 0 is allowed")
+        check_share(self, "the second term's part of the shear modulus")
+
+    def function(self, J: Any) -> tuple[Any, Any, Any]:
+        log = np.log1p(J / 3)
+        value = slope = curvature = 0.0
+        for mu, alpha in ((1 - self.share, self.alpha1), (self.share, self.alpha2)):
+            rise = mu / 2 * np.exp((alpha - 1) * log)
+            value = value + 1.5 * mu / alpha * np.expm1(alpha * log)
+            slope, curvature = slope + rise, curvature + (alpha - 1) / 3 * rise
+        return value, slope, curvature * np.exp(-log)
+
+
+@dataclass(frozen=True)
+class _TubeChains(InvariantMaterial):
+    """Chains between the links of an extended tube; ``square`` is delta^2. They lock at J = 1/delta^2."""
+
+    square: Any
+
+    def function(self, J: Any) -> tuple[Any, Any, Any]:
+        x = self.square
+        log = np.log1p(-x * J)
+        room = np.exp(-log)  # 1/(1 - x J), and NaN beyond locking
+        half = 0.5 / (1 - 2 * x)
+        rise = 1 - 2 * x + x * x * J
+        return half * ((1 - x) * J * room + log), half * rise * room**2, half * x * (2 - 3 * x + x * x * J) * room**3
+
+
+#: 2 (sum of the 1/lambda_i - 3), at strains multiplied by beta
+_TUBE = Ogden((-2.0,), (-1.0,))
+
+
+@dataclass(frozen=True)
+class ExtendedTube:
+    """Extended-tube strain energy: chains of finite length in tubes that entanglements make (Kaliske and Heinrich 1999).
+
+    W = G_c/2 ((1 - delta^2) J/(1 - delta^2 J) + log(1 - delta^2 J)) + 2 G_e/beta^2 sum_i (lambda_i^-beta - 1) with J = I_1 - 3; Rubber
+    Chem. Technol. 72 (1999). The shear modulus is (1 - 2 delta^2) G_c + G_e = 1.
+
+    Parameters
+    ----------
+    beta : float
+        Release of the tubes, 0 < beta <= 1.
+    delta : float
+        Inextensibility of the chains, at least 0, with 2 delta^2 < 1. The material locks at J = 1/delta^2, and W is NaN beyond.
+    share : float
+        G_e, the part of the entanglements in the shear modulus: at least 0 and below 1.
+
+    Raises
+    ------
+    InputError
+        For numbers outside these bounds.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> tube = fm.ExtendedTube(beta=0.3, delta=0.1, share=0.5)
+    >>> round(float(tube.energy(0.5, 0.5)), 4)
+    1.452
+    """
+
+    beta: float
+    delta: float
+    share: float
+
+    def __post_init__(self) -> None:
+        store(self, beta=between("material.beta", self.beta, 0, 1, "a number > 0, and 1 at most, is allowed"))
+        if self.beta < SMALLEST:
+            raise InputError("material.beta", self.beta, "a number > 0, and 1 at most, is allowed")
+        convert(self, "material.delta", "a number >= 0 is allowed", least=0)
+        if not 2 * self.delta**2 < 1:
+            allowed = "a number >= 0 and < sqrt(1/2) is allowed: the chains have no stiffness at rest otherwise"
+            raise InputError("material.delta", self.delta, allowed)
+        check_share(self, "the entanglements' part of the shear modulus")
+
+    def energy(self, e1: Any, e2: Any) -> Any:
+        chains, beta = self._chains.energy(e1, e2), self.beta
+        return (1 - self.share) * chains + self.share / beta**2 * _TUBE.energy(beta * e1, beta * e2)
+
+    def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        chains, beta = self._chains.stress(e1, e2), self.beta
+        tube = _TUBE.stress(beta * e1, beta * e2)
+        s1, s2 = ((1 - self.share) * c + self.share / beta * t for c, t in zip(chains, tube, strict=True))
+        return s1, s2
+
+    def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
+        chains, beta = self._chains.tangent(e1, e2), self.beta
+        tube = _TUBE.tangent(beta * e1, beta * e2)
+        s11, s12, s22 = ((1 - self.share) * c + self.share * t for c, t in zip(chains, tube, strict=True))
+        return s11, s12, s22
+
+    @property
+    def _chains(self) -> _TubeChains:
+        return _TubeChains(self.delta * self.delta)
+
+
+def check_share(material: Any, meaning: str) -> None:
+    """Turn the attribute ``share`` of a material into a float of at least 0 and below 1."""
+    share = number("material.share", material.share, f"a number >= 0 and < 1 is allowed: {meaning}", least=0)
+    if not share < 1:
+        raise InputError("material.share", share, f"a number >= 0 and < 1 is allowed: {meaning}")
+    store(material, share=share)

@@ -4,7 +4,7 @@ The meridian is a curve s -> (R, Z), displaced by (u, w) to (rho, eta) = (R + u,
 
     lambda_1 = |(rho_s, eta_s)| / |(R_s, Z_s)|        meridional
     lambda_2 = rho / R                                circumferential
-    lambda_3 = 1 / (lambda_1 lambda_2)                thickness (incompressible)
+    lambda_3 = 1 / (lambda_1 lambda_2)                thickness (where a material does not change its volume)
 
 Everything is written in logarithmic strains e_i = log lambda_i (Hencky 1928), from displacements and through log1p. So strains far below
 round-off of 1 keep their relative accuracy; a nearly flat membrane has strains of order V^2. Axisymmetric membranes: A. E. Green and

@@ -12,12 +12,12 @@ J. Wash. Acad. Sci. 44 (1954) for the inequality that the numbers must meet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..checks import convert, number
+from ..checks import choice, convert, number, store
 from ..errors import InputError
 
 
@@ -52,6 +52,10 @@ class Material(Protocol):
         """
 
 
+#: factors of a term of Ogden's: the package's own, and that of other programs
+CONVENTIONS = ("mu/alpha", "2mu/alpha^2")
+
+
 @dataclass(frozen=True)
 class Ogden:
     """Ogden's strain energy with any number of terms (Ogden 1972; paper eq. 41).
@@ -62,6 +66,9 @@ class Ogden:
     ----------
     mu, alpha : tuple of float
         Moduli (in units of the shear modulus) and exponents; each mu_k alpha_k > 0 and their sum is 2.
+    convention : {"mu/alpha", "2mu/alpha^2"}
+        Factor of a term. Other programs write 2 mu_k/alpha_k^2 for mu_k/alpha_k (Abaqus, for example): then each mu_k > 0 and their sum is
+        1. Such moduli are converted, mu_k to 2 mu_k/alpha_k, and the material remembers nothing of it.
 
     Raises
     ------
@@ -70,37 +77,68 @@ class Ogden:
 
     Examples
     --------
-    Equal stretches of 2 in both directions, in rubber with two terms:
+    Equal stretches of 2 in both directions, in rubber with two terms, and the same rubber as other programs write it:
 
     >>> from math import log
     >>> import femmembrane as fm
     >>> rubber = fm.Ogden(mu=(1.4, -0.1), alpha=(1.3, -1.8))
     >>> round(float(rubber.stress(log(2), log(2))[0]), 4)
     4.4001
+    >>> same = fm.Ogden(mu=(0.91, 0.09), alpha=(1.3, -1.8), convention="2mu/alpha^2")
+    >>> [round(mu, 12) for mu in same.mu], same.convention
+    ([1.4, -0.1], 'mu/alpha')
     """
 
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
+    convention: str = field(default=CONVENTIONS[0], metadata={"quiet": True})
 
     def __post_init__(self) -> None:
         for key in ("mu", "alpha"):
             object.__setattr__(self, key, _numbers(f"material.{key}", getattr(self, key)))
+        choice("material.convention", self.convention, CONVENTIONS)
         if len(self.mu) != len(self.alpha):
             raise InputError("material.alpha", self.alpha, f"as many exponents as moduli are allowed ({len(self.mu)} in material.mu)")
+        if 0 in self.alpha:
+            raise InputError("material.alpha", self.alpha, "exponents other than 0 are allowed")
+        (self._check_own if self.convention == CONVENTIONS[0] else self._check_other)()
+        if self.convention != CONVENTIONS[0]:
+            moduli = tuple(2 * m / a for m, a in zip(self.mu, self.alpha, strict=True))
+            store(self, mu=moduli, convention=CONVENTIONS[0])
+
+    def _check_own(self) -> None:
+        """Each mu alpha > 0, and their sum 2."""
         products = [m * a for m, a in zip(self.mu, self.alpha, strict=True)]
+        other = f'convention = "{CONVENTIONS[1]}"'
         for k, product in enumerate(products):
             if not product > 0:
+                hint = ""
+                if all(m > 0 for m in self.mu):  # the other convention asks for just that
+                    hint = f"; where the terms are 2 mu/alpha^2 (Abaqus and others), say {other}"
                 raise InputError(
                     f"material.mu[{k}]",
                     self.mu[k],
-                    f"mu alpha > 0 is required of every term; mu must have the sign of alpha = {self.alpha[k]!r}",
+                    f"mu alpha > 0 is required of every term; mu must have the sign of alpha = {self.alpha[k]!r}{hint}",
                 )
-        if not abs(sum(products) - 2) <= 1e-6:
+        total = sum(products) / 2
+        if not abs(total - 1) <= 5e-7:
+            hint = f"divide mu by {total:.9g}"
+            if abs(sum(self.mu) - 1) <= 5e-7:
+                hint = f"the sum of mu is 1, as where the terms are 2 mu/alpha^2 (Abaqus and others): say {other}, or {hint}"
             raise InputError(
-                "material.mu",
-                self.mu,
-                f"the sum of mu alpha must be 2 (shear modulus 1), not {sum(products):.9g}; divide mu by {sum(products) / 2:.9g}",
+                "material.mu", self.mu, f"the sum of mu alpha must be 2 (shear modulus 1), not {2 * total:.9g}; {hint}{_in_pa(total)}"
             )
+
+    def _check_other(self) -> None:
+        """Each mu > 0, and their sum 1."""
+        for k, modulus in enumerate(self.mu):
+            if not modulus > 0:
+                allowed = f'mu > 0 is required of every term in the convention "{self.convention}"'
+                raise InputError(f"material.mu[{k}]", modulus, allowed)
+        total = sum(self.mu)
+        if not abs(total - 1) <= 5e-7:
+            allowed = f'the sum of mu must be 1 (the shear modulus) in the convention "{self.convention}", not {total:.9g}'
+            raise InputError("material.mu", self.mu, f"{allowed}; divide mu by {total:.9g}{_in_pa(total)}")
 
     @classmethod
     def treloar(cls) -> Ogden:
@@ -218,6 +256,11 @@ class MooneyRivlin(OgdenForm):
 def _powers(alpha: float, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
     """lambda_i^alpha - 1 for the three principal stretches."""
     return np.expm1(alpha * e1), np.expm1(alpha * e2), np.expm1(-alpha * (e1 + e2))
+
+
+def _in_pa(modulus: float) -> str:
+    """What to do with moduli that are likely to be in Pa: a shear modulus of a few units is none."""
+    return f", which is the shear modulus in Pa if mu is in Pa (scales.shear_modulus = {modulus:.9g})" if modulus > 100 else ""
 
 
 def _numbers(key: str, values: Any) -> tuple[float, ...]:

@@ -11,6 +11,9 @@ Hencky strains, and x+ the positive part of x, all of this is the energy at the 
     meridian wrinkled n_1 = -e_2/2, n_2 = e_2       stress around the axis alone
     slack            n_1 = n_2 = 0                  no energy, no stress
 
+A compressible material answers its own natural width, of which the package asks ``natural_width(e)``, the strain across and its slope. Then
+that stands for -e/2 above.
+
 W* is the relaxation (quasiconvex envelope) of W where the Baker-Ericksen inequalities hold. A term of the potential that depends on the
 position alone, like the magnetic energy, passes through the relaxation unchanged. So W* relaxes the whole potential at a given pressure. W*
 is once continuously differentiable; its second derivatives jump across the borders of the zones. Nothing is smoothed.
@@ -18,10 +21,13 @@ is once continuously differentiable; its second derivatives jump across the bord
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from .materials import Material
+
+Width = Callable[[Any], tuple[Any, Any]]
 
 
 @dataclass(frozen=True)
@@ -33,36 +39,62 @@ class TensionField:
     Parameters
     ----------
     material : Material
-        Any isotropic incompressible strain energy.
+        Any isotropic strain energy.
     """
 
     material: Material
 
     def energy(self, e1: Any, e2: Any) -> Any:
-        n1, n2, _, _ = natural_strains(e1, e2)
+        n1, n2, _, _ = natural_strains(e1, e2, self.width)
         return self.material.energy(n1, n2)
 
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
-        n1, n2, taut1, taut2 = natural_strains(e1, e2)
+        n1, n2, taut1, taut2 = natural_strains(e1, e2, self.width)
         s1, s2 = self.material.stress(n1, n2)
         return taut1 * s1, taut2 * s2  # at natural width the stress across is zero: here exactly
 
     def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
-        n1, n2, taut1, taut2 = natural_strains(e1, e2)
+        n1, n2, taut1, taut2 = natural_strains(e1, e2, self.width)
         s11, s12, s22 = self.material.tangent(n1, n2)
-        # in simple tension d(s_1)/d(e_1) = s_11 - s_12/2
-        return taut1 * (s11 - (1 - taut2) * s12 / 2), taut1 * taut2 * s12, taut2 * (s22 - (1 - taut1) * s12 / 2)
+        across1, across2 = self.width(n2)[1], self.width(n1)[1]
+        # in simple tension d(s_1)/d(e_1) = s_11 + s_12 dn_2/de_1, which is s_11 - s_12/2 where the volume stays
+        return taut1 * (s11 + (1 - taut2) * s12 * across2), taut1 * taut2 * s12, taut2 * (s22 + (1 - taut1) * s12 * across1)
+
+    @property
+    def width(self) -> Width:
+        return natural_width(self.material)
 
 
-def natural_strains(e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
+def natural_width(material: Material) -> Width:
+    """Strain across a strip of a material in simple tension, and its slope, as a function of the strain along it."""
+    own: Width = getattr(material, "natural_width", _incompressible)
+    return own
+
+
+def _incompressible(e: Any) -> tuple[Any, Any]:
+    return -0.5 * e, -0.5
+
+
+def natural_strains(e1: Any, e2: Any, width: Width = _incompressible) -> tuple[Any, Any, Any, Any]:
     """Natural strains (n_1, n_2), and whether the membrane is taut along each direction.
 
     It is written with products of truth values, not with minima and maxima, so that a NaN stays a NaN: a state outside the domain of the
     energy must not pass for a slack state.
     """
-    least1, least2 = -0.5 * (e2 > 0) * e2, -0.5 * (e1 > 0) * e1
+    least1, least2 = (e2 > 0) * width(e2)[0], (e1 > 0) * width(e1)[0]
     taut1, taut2 = e1 >= least1, e2 >= least2
     return taut1 * e1 + (1 - taut1) * least1, taut2 * e2 + (1 - taut2) * least2, taut1, taut2
+
+
+def cauchy_stress(material: Material, tension_field: bool, e1: Any, e2: Any) -> tuple[Any, Any]:
+    """Principal Cauchy stresses: lambda_i dW/dlambda_i over the volume ratio, which is 1 unless the material says otherwise."""
+    s1, s2 = strain_energy(material, tension_field).stress(e1, e2)
+    ratio = getattr(material, "volume_ratio", None)
+    if ratio is None:
+        return s1, s2
+    n1, n2 = natural_strains(e1, e2, natural_width(material))[:2] if tension_field else (e1, e2)
+    volume = ratio(n1, n2)
+    return s1 / volume, s2 / volume
 
 
 def strain_energy(material: Material, tension_field: bool) -> Material:

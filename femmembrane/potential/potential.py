@@ -179,10 +179,11 @@ class Potential:
             raise InputError("load", self.loads, advice)
         pulled = any(type(load).on_hubs is not Load.on_hubs for load in self.loads)
         forces = on_hubs(self.loads, [end.rigid for end in space.supports]) if pulled else None
-        level = not (space.Z.any() or space.Z_x.any())
-        self.flat = level and not space.strained
+        self.level = not (space.Z.any() or space.Z_x.any())
+        self.strained = space.strained or self.prestressed
+        self.flat = self.level and not self.strained
         columns = {"R": space.R, "R_x": space.R_x, "weight": space.weights}
-        if not level:
+        if not self.level:
             columns |= {"Z": space.Z, "Z_x": space.Z_x}
         if space.wall is not None:
             columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
@@ -202,6 +203,11 @@ class Potential:
     def surrounded(self) -> bool:
         """Whether anything but the pressure acts on the membrane. Otherwise the flat unloaded state is an equilibrium without stiffness."""
         return bool(self.sources or self.loads)
+
+    @property
+    def prestressed(self) -> bool:
+        """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
+        return bool(getattr(self.scene.material, "prestressed", False))
 
     @property
     def material(self) -> Material:

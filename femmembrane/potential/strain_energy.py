@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..checks import store, switch
 from ..errors import InputError
 from .expressions import BUILDING, casadi_answers_numpy, point_rows
 from .replay import at_points
@@ -27,12 +28,15 @@ class StrainEnergy:
     function : callable
         W(lambda_1, lambda_2) of an isotropic incompressible membrane, in units of the shear modulus. It may use arithmetic and NumPy's
         ufuncs, which act on arrays and CasADi symbols alike; ``np.where`` does not.
+    prestressed : bool
+        Whether there may be stress at rest. Then it must be a tension, W need not be 0 there, and mu is what the function is in units of. A
+        flat membrane of it has stiffness at rest.
 
     Raises
     ------
     InputError
         For a function that does not accept symbols, is not 0 and free of stress at rest, is not symmetric in the two stretches, or has a
-        shear modulus other than 1.
+        shear modulus other than 1. For a pre-stressed one that is compressed at rest, or has no stiffness in its plane there.
 
     Examples
     --------
@@ -40,9 +44,17 @@ class StrainEnergy:
     >>> own = fm.StrainEnergy(lambda l1, l2: (l1**2 + l2**2 + 1 / (l1 * l2) ** 2 - 3) / 2)  # neo-Hookean
     >>> print(f"{fm.equilibrium(fm.Scene(material=own, mesh=fm.disc(16)), volume=1.0).pressure:.4f}")
     1.0669
+
+    A sheet that was stretched by 1.5 and then clamped, with lengths and thickness as they were then: the tension at rest is p^2 - p^-4.
+
+    >>> stretched = lambda l1, l2, p=1.5: own.function(p * l1, p * l2)
+    >>> tense = fm.StrainEnergy(stretched, prestressed=True)
+    >>> round(float(tense.stress(0.0, 0.0)[0]), 4)
+    2.0525
     """
 
     function: Callable[[Any, Any], Any]
+    prestressed: bool = False
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -52,13 +64,25 @@ class StrainEnergy:
         except Exception as error:  # whatever a stranger's function raises
             what = f"it must accept symbols ({type(error).__name__}: {error}); use arithmetic and NumPy's ufuncs"
             raise InputError("material.function", self.function, what) from error
-        if not np.allclose(rest[:3], 0, atol=1e-10):
+        store(self, prestressed=switch("material.prestressed", self.prestressed))
+        if not self.prestressed and not np.allclose(rest[:3], 0, atol=1e-10):
             found = ", ".join(f"{v:.6g}" for v in rest[:3])
-            raise InputError("material.function", self.function, f"W and both stresses must be 0 at rest, not {found}")
+            hint = "; say prestressed=True where the membrane is under tension at rest" if rest[1] > 0 else ""
+            raise InputError("material.function", self.function, f"W and both stresses must be 0 at rest, not {found}{hint}")
         if not np.allclose(there, mirrored[[0, 2, 1, 5, 4, 3]], rtol=1e-8):
             raise InputError("material.function", self.function, "it must be symmetric in the two stretches (isotropic)")
-        if not np.allclose(rest[3:], [4, 2, 4], rtol=1e-6):
+        if self.prestressed:
+            self._check_tension(rest)
+        elif not np.allclose(rest[3:], [4, 2, 4], rtol=1e-6):
             what = f"the shear modulus must be 1, not {rest[4] / 2:.9g}; divide W by it (W = 2 (e1^2 + e1 e2 + e2^2) at small log strains)"
+            raise InputError("material.function", self.function, what)
+
+    def _check_tension(self, rest: Any) -> None:
+        _, s, _, s11, s12, _ = rest
+        if not s >= 0:
+            raise InputError("material.function", self.function, f"a tension is allowed at rest, not the stress {s:.6g}")
+        if not s11 - s > abs(s12):  # second derivatives with respect to the stretches
+            what = f"it must be stiff in its plane at rest, not W_11 = {s11 - s:.6g} with W_12 = {s12:.6g}"
             raise InputError("material.function", self.function, what)
 
     def energy(self, e1: Any, e2: Any) -> Any:

@@ -38,7 +38,9 @@ from ..discretization.mesh_files import read_meridian
 from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
-from ..physics.invariant import ArrudaBoyce, Fung, Gent, Yeoh
+from ..physics.hooke import Hooke
+from ..physics.invariant import ArrudaBoyce, ExtendedTube, Fung, Gent, LopezPamies, Yeoh
+from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
 from ..physics.loads import HubForce, Hydrostatic, Weight
 from ..physics.magnetics import Dipole
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
@@ -53,12 +55,18 @@ if TYPE_CHECKING:
 
 MATERIALS: dict[str, Any] = {
     "arruda-boyce": ArrudaBoyce,
+    "extended-tube": ExtendedTube,
     "fung": Fung,
     "gent": Gent,
+    "gent-gent": GentGent,
+    "hooke": Hooke,
+    "lopez-pamies": LopezPamies,
     "mooney-rivlin": MooneyRivlin,
     "neo-hookean": NeoHookean,
     "ogden": Ogden,
+    "polynomial": Polynomial,
     "varga": Varga,
+    "veronda-westmann": VerondaWestmann,
     "yeoh": Yeoh,
 }
 SOURCES: dict[str, Any] = {

@@ -144,6 +144,9 @@ class Scene:
             modulus=Along.of("membrane.modulus", self.modulus),
             prestretch=_prestretch("membrane.prestretch", self.prestretch),
         )
+        if self.tension_field and getattr(self.material, "prestressed", False):
+            allowed = "false is allowed with a pre-stressed strain energy: its width without stress is not known"
+            raise InputError("effects.tension_field", True, allowed)
         self._check_size()
         self._check_sheet()
         lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched

@@ -4,7 +4,7 @@
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
 ``membrane.susceptibility``  chi
-``material.NAME``        a number of a material that has such an argument
+``material.NAME``        a number of a material that has such an argument; others change with it where its ``numbers_with`` says so
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
 ``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
 ======================== ==================================================================================================
@@ -136,9 +136,10 @@ class Parameter:
 
     def _material_numbers(self, rest: str, value: Any) -> dict[str, Any]:
         name, _, index = rest.partition(".")
-        if not index:
-            return {name: value}
         material: Any = self.scene.material
+        if not index:
+            changed: dict[str, Any] = getattr(material, "numbers_with", _alone)(name, value)
+            return changed
         k, mu, alpha = int(index), list(material.mu), list(material.alpha)
         if name == "alpha":
             mu[k] = mu[k] * alpha[k] / value
@@ -168,6 +169,11 @@ def _numbers(owner: Any) -> list[str]:
         return []
     real = [f.name for f in dataclasses.fields(owner) if f.init and f.type in ("float", float)]
     return [name for name in real if isinstance(getattr(owner, name), Real)]
+
+
+def _alone(name: str, value: Any) -> dict[str, Any]:
+    """A number of a material without others that must change with it."""
+    return {name: value}
 
 
 def _unchecked(owner: Any, **changes: Any) -> Any:

@@ -199,7 +199,7 @@ class LoadPath:
         ):
             return guess, None  # a limit point at this very pressure, which no corrector finds under pressure control
         if result.status is Status.NOT_A_MINIMUM:
-            if self.potential.space.strained and (bad := ill_posed(self.potential, guess.evaluation)) is not None:
+            if self.potential.strained and (bad := ill_posed(self.potential, guess.evaluation)) is not None:
                 where = f"in the state found there (V = {guess.volume:.6g}, P = {guess.pressure:.6g}) {bad}"
                 raise SolveError(where, status=bad.status)
             turn = self._lost(guess, load)

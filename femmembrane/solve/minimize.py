@@ -74,7 +74,7 @@ def minimize(
     """
     evaluation = evaluation or potential.evaluate(x, pressure, magnetic)
     scale_u, scale_w = (float(np.abs(x[index]).max(initial=0.0)) or 1.0 for index in potential.space.fields)
-    if potential.space.strained:  # stiff in both directions, so that one length measures both
+    if potential.strained:  # stiff in both directions, so that one length measures both
         scale_u = scale_w = max(displaced(potential, x))
     scales = np.empty_like(x)
     scales[potential.space.fields[0]], scales[potential.space.fields[1]] = scale_u, scale_w

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..discretization.space import Space
 from ..errors import Status
 from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
@@ -177,11 +176,11 @@ class Equations:
         gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
         if self.bordered is None:
             self.bordered, dx, dp, self._change, size = self.evaluation.step(self._row, self._corner, gap)
-            self._size = with_lift(self.potential.space, size)
+            self._size = with_lift(self.potential, size)
             return dx, dp
         largest = self.evaluation.elements.largest
         dx, dp = self.bordered.solve(self.evaluation.unbalanced, -gap)
-        self._change, self._size = largest(dx), with_lift(self.potential.space, largest(self.x))
+        self._change, self._size = largest(dx), with_lift(self.potential, largest(self.x))
         return dx, dp
 
     def size(self) -> float:
@@ -242,14 +241,20 @@ def relative_size(potential: Potential, dx: Array, x: Array) -> float:
 
 def displaced(potential: Potential, x: Array) -> tuple[float, float]:
     """Largest displacements u and w of a state, or those that the places of the ends make of themselves where these are larger."""
-    return with_lift(potential.space, potential.largest(x))
+    return with_lift(potential, potential.largest(x))
 
 
-def with_lift(space: Space, size: tuple[float, float]) -> tuple[float, float]:
-    """Largest unknowns u and w, or the displacements that the places of the ends make where these are larger."""
-    if space.lift is None:
+def with_lift(potential: Potential, size: tuple[float, float]) -> tuple[float, float]:
+    """Largest unknowns u and w, or the displacements that the places of the ends make where these are larger.
+
+    Forces of a material with stress at rest are round-off of the membrane's own size.
+    """
+    if not potential.strained and potential.space.lift is None:
         return size
-    (u, w), (u0, w0) = size, space.lift_size
+    space, (u, w) = potential.space, size
+    u0, w0 = (0.0, 0.0) if space.lift is None else space.lift_size
+    if potential.prestressed:
+        u0, w0 = max(u0, space.unit), w0 if potential.level else max(w0, space.unit)
     return max(u, u0), max(w, w0)
 
 

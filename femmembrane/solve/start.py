@@ -71,7 +71,7 @@ def unloaded(potential: Potential) -> State | None:
 
 def _without_load(potential: Potential) -> State | None:
     """As :func:`unloaded`, whether it is compressed or not."""
-    if not potential.space.strained or potential.space.loose:
+    if not potential.strained or potential.space.loose:
         return None
     control, x = PressureControl(0.0), np.zeros(potential.space.n_free)
     result = correct(potential, control, x, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
@@ -252,7 +252,7 @@ def _inflated(potential: Potential, volume: float) -> State:
     if potential.space.loose:
         potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
     rest = potential.space.reference_volume
-    if volume == rest and not (potential.flat or potential.space.strained):
+    if volume == rest and not (potential.flat or potential.strained):
         return flat_state(potential, magnetic=0.0)
     if (drawn := unloaded(potential)) is not None and (state := _drawn_to(potential, drawn, volume)) is not None:
         return state
@@ -432,7 +432,7 @@ def _ways_from(
 ) -> Iterator[tuple[str, Way]]:
     """Ways to a load that is no volume."""
     rest = potential.space.reference_volume
-    if potential.space.strained:
+    if potential.strained:
         nearest = usual_volume(potential)
         yield f"the branch through V = {nearest:.6g}", lambda: _along(potential, start_at_volume(potential, nearest), held, load, accept)
     for share in (1.0, 10.0, 100.0):  # further out where the first branch ends, or takes too many steps
@@ -478,7 +478,7 @@ def _first_met(
     if point.state.value_of(held) == load and (accept is None or accept(point.state)):
         return point.state
     space = potential.space
-    away = np.inf if space.strained else abs(point.state.volume - space.reference_volume) / space.units["volume"]
+    away = np.inf if potential.strained else abs(point.state.volume - space.reference_volume) / space.units["volume"]
     control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
     tracer = Tracer(Predictor(), control.first * min(1.0, np.sqrt(away)), control)
     problem, spare = BranchProblem(potential), None

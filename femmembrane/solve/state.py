@@ -57,9 +57,10 @@ class State:
 def rests_flat(potential: Potential) -> bool:
     """Whether the undeformed membrane is an equilibrium without load, and has no stiffness there: nothing pulls at it.
 
-    A membrane that is held where it does not rest is stretched, or compressed, without load: its states there are as all others.
+    A membrane that is held where it does not rest, or that has stress there, is stretched or compressed without load. Its states there are
+    ordinary ones.
     """
-    if potential.space.strained:
+    if potential.strained:
         return False
     return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
 

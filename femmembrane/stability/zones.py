@@ -13,7 +13,8 @@ field the mechanical stress across wrinkles is exactly zero; there the strain be
 
     g_1 = e_1 + max(e_2, 0)/2,      g_2 = e_2 + max(e_1, 0)/2
 
-It vanishes where the membrane stops being taut, as the stress of the plain material does.
+It vanishes where the membrane stops being taut, as the stress of the plain material does. (A compressible material has its own
+natural width in place of -e/2.)
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from ..checks import choice
 from ..discretization.space import Space, space_of_scene
+from ..physics.tension_field import natural_width
 from ..potential import potential_of
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
@@ -123,7 +125,7 @@ def _changing(
 def _deciding(scene: Scene, x: Array, pressure: float, criterion: str) -> _Stresses:
     def deciding(s: Array) -> tuple[Array, Array]:
         profile = profile_at(scene, x, pressure, s)
-        return profile.total if criterion == "total" else _mechanical(profile, scene.tension_field)
+        return profile.total if criterion == "total" else _mechanical(profile, scene)
 
     return deciding
 
@@ -167,11 +169,11 @@ def _runs(flags: Sequence[bool]) -> list[tuple[int, int]]:
     return list(zip(starts, stops, strict=True))
 
 
-def _mechanical(profile: Profile, tension_field: bool) -> tuple[Array, Array]:
-    if not tension_field:
+def _mechanical(profile: Profile, scene: Scene) -> tuple[Array, Array]:
+    if not scene.tension_field:
         return profile.mechanical
-    e1, e2 = profile.strain
-    return e1 + np.maximum(e2, 0) / 2, e2 + np.maximum(e1, 0) / 2
+    (e1, e2), width = profile.strain, natural_width(scene.material)
+    return e1 - width(np.maximum(e2, 0))[0], e2 - width(np.maximum(e1, 0))[0]
 
 
 def _tiles(space: Space, deciding: _Stresses) -> tuple[list[int], Array]:

@@ -1,15 +1,16 @@
 """Figures 4, 5, 6, 8 and 10 again, with the field of the magnetised sheet itself beside the paper's weak field.
 
-The paper takes the magnetisation for so weak that the sheet does not change the field. With its susceptibility of 2.5 it does: across a thin
-sheet the normal flux density is continuous, so that the normal field inside is h_n/(1 + chi). The energy then depends on the slope of the
-meridian: a normal field turns the sheet towards itself, as if it compressed it by chi^2/(1 + chi) h_n^2.
+The paper takes the magnetisation for so weak that the sheet does not change the field. With its susceptibility of 2.5 it does: across a
+thin sheet the normal flux density is continuous, so that the normal field inside is h_n/(1 + chi). The energy then depends on the slope
+of the meridian: a normal field turns the sheet towards itself, as if it compressed it by chi^2/(1 + chi) h_n^2.
 
 Above (h = 6, 6.5) the first two limit points move by less than 0.6 %. The third one, at which the membrane snaps to the dipole, is 4 %
-higher, and with M = 600 at h = 6 there is one again. Below, where the field is strong and normal, pressures at a pole height of 1 fall by 10
-to 30 %, and most of what figures 5 and 8 show is gone. The equilibria end where stress and field do not hold the meridian any longer: the
-Legendre-Hadamard condition fails there, with tension everywhere but in the closest case. Well before that the hoop stress does not hold the
-rim, which wrinkles along meridians while it is still stable against 1, 2 and 3 waves: the membrane does not tip over, it wrinkles first. Of
-the four equilibria of figure 10a the largest alone is left, since the limit point has sunk below their pressure; figure 10b keeps its four.
+higher, and with M = 600 at h = 6 there is one again. Below, where the field is strong and normal, pressures at a pole height of 1 fall by
+10 to 30 %, and most of what figures 5 and 8 show is gone. The equilibria end where stress and field do not hold the meridian any longer:
+the Legendre-Hadamard condition fails there, with tension everywhere but in the closest case. Well before that the hoop stress does not
+hold the rim, which wrinkles along meridians while it is still stable against 1, 2 and 3 waves: the membrane does not tip over, it
+wrinkles first. Of the four equilibria of figure 10a the largest alone is left, since the limit point has sunk below their pressure;
+figure 10b keeps its four.
 
     python demos/paper/self_field.py               pictures and table in out/self-field, 25 seconds (--quick: figures 6 and 10)
 """

@@ -115,6 +115,11 @@ class Magnetisation:
         """Whether there is a remanence along the normal."""
         return self.remanence is not None and self.direction == "normal"
 
+    @property
+    def meridional(self) -> bool:
+        """Whether there is a remanence along the meridian: in an axial field such a sheet has a cone at its pole."""
+        return self.remanence is not None and self.direction == "meridional"
+
     def soft(self, tangential: Any, normal: Any) -> Law:
         """Energy of the induced magnetisation in a field with |h_t|^2 and h_n, with its derivatives.
 

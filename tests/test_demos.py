@@ -64,6 +64,14 @@ def test_figure_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"figure-7.csv", "figure-7.png"}
 
 
+def test_self_field(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The largest pressures and the equilibria at one pressure, without and with the self-field."""
+    monkeypatch.syspath_prepend(str(DEMOS / "paper"))
+    monkeypatch.setattr(sys, "argv", ["self_field.py", "--quick", "--out", str(tmp_path / "out")])
+    runpy.run_path(str(DEMOS / "paper" / "self_field.py"), run_name="__main__")
+    assert "largest P, M = 200, h = 6.5" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("scene", sorted(path.name for path in DEMOS.glob("*.toml")))
 def test_scene_file(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """It reads, says what to compute, and (on a coarse mesh) the command computes it without a word."""

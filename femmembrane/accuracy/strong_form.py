@@ -29,7 +29,7 @@ from ..checks import between, convert, number, only
 from ..discretization.meridian import Disc
 from ..errors import InputError
 from ..physics.loads import over_projection, over_reference
-from ..physics.magnetics import acting_sources, magnetic_energy_density
+from ..physics.magnetisation import Magnetisation, position_energy_density, sources_that_act
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -71,7 +71,13 @@ class StrongForm:
             raise InputError("mesh.shape", getattr(scene.mesh, "shape", scene.mesh), "the disc is allowed")
         self.material = scene.material
         self.susceptibility = scene.susceptibility or 0.0
-        self.sources = acting_sources(scene.sources, self.susceptibility)
+        self.saturation = scene.saturation
+        self.sources = sources_that_act(scene)
+        magnetisation = Magnetisation.of(scene) if self.sources else None
+        if magnetisation is not None and magnetisation.tilts:
+            key = "membrane.remanence" if magnetisation.remanence is not None else "effects.demagnetization"
+            allowed = "none is allowed here: these equations have magnetic energies that depend on the position alone"
+            raise InputError(key, scene.remanence if magnetisation.remanence is not None else True, allowed)
         self.loads = tuple(load for load in scene.loads if load.acts)
         self.evaluations = 0
 
@@ -144,7 +150,7 @@ class StrongForm:
         return gradient[0], gradient[1]
 
     def _magnetic(self, rho: Any, eta: Any) -> Any:
-        return magnetic_energy_density(self.sources, self.susceptibility, rho, eta)
+        return position_energy_density(self.sources, self.susceptibility, self.saturation, rho, eta)
 
     def _lift(self, e: Any, eta: Any, pressure: Any) -> Any:
         """(m_eta - P lambda^2)/W_1 at the pole."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from ..physics.magnetics import acting_sources
+from ..physics.magnetisation import seen_by
 from ..threads import cached_property
 from .elements import lagrange, lobatto, shape_functions
 from .meridian import Array, Meridian
@@ -353,8 +353,7 @@ def space_of_scene(scene: Any) -> Space:
 
 def anchored(scene: Any) -> frozenset[str]:
     """Directions in which the place of the membrane matters to the sources and loads of a scene that do something."""
-    acting = [*acting_sources(scene.sources, scene.susceptibility), *(load for load in scene.loads if load.acts)]
-    return frozenset().union(*(part.sees for part in acting))
+    return seen_by(scene).union(*(load.sees for load in scene.loads if load.acts))
 
 
 def _sum_by(index: NDArray[np.int64], values: Array, length: int) -> Array:

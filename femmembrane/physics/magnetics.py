@@ -178,9 +178,9 @@ def check_source(source: Any) -> None:
         store(source, orientation=sign("source.orientation", source.orientation))
 
 
-def acting_sources(sources: Sequence[Source], susceptibility: Any) -> tuple[Source, ...]:
-    """The sources that do something: without strength a source does nothing, and without susceptibility no source acts on a membrane."""
-    return tuple(s for s in sources if getattr(s, "strength", 1.0) != 0) if susceptibility else ()
+def acting_sources(sources: Sequence[Source], magnetic: bool) -> tuple[Source, ...]:
+    """The sources that do something: without strength a source does nothing, and none acts on a membrane that is not magnetic."""
+    return tuple(s for s in sources if getattr(s, "strength", 1.0) != 0) if magnetic else ()
 
 
 def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any, Any]:
@@ -191,10 +191,15 @@ def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, 
 
 def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rho: Any, eta: Any) -> Any:
     """-chi/2 |h|^2 per reference area, in units of mu T."""
+    return -susceptibility / 2 * field_intensity(sources, rho, eta)
+
+
+def field_intensity(sources: Sequence[Source], rho: Any, eta: Any) -> Any:
+    """|h|^2 of all sources together."""
     if len(sources) == 1:
-        return -susceptibility / 2 * sources[0].intensity(rho, eta)
+        return sources[0].intensity(rho, eta)
     h_rho, h_z, h_theta = magnetic_field(sources, rho, eta)
-    return -susceptibility / 2 * (h_rho**2 + h_z**2 + h_theta**2)
+    return h_rho**2 + h_z**2 + h_theta**2
 
 
 def swept(before: Array, after: Array, circle: tuple[float, float]) -> bool:

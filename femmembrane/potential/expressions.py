@@ -21,8 +21,10 @@ from ..discretization.space import Space
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, hub_density, lidded_volume_density, over_projection, over_reference, volume_density, wall_density
 from ..physics.magnetics import Source, magnetic_energy_density
+from ..physics.magnetisation import Magnetisation
 from ..physics.tension_field import strain_energy
 from ..threads import Guard
+from .magnetic import point_energy
 
 if TYPE_CHECKING:
     from ..physics.materials import Material
@@ -84,8 +86,15 @@ def point_expressions(
     inside = weight if space.side > 0 else -weight
     volume = inside * enclosed
     magnetic = ca.SX(0)
-    if sources and scene.susceptibility:
-        magnetic = area * magnetic_energy_density(sources, scene.susceptibility, R + u, Z + w)
+    magnetisation = Magnetisation.of(scene) if sources else None
+    if magnetisation is not None:
+        remanence = data[columns.index("remanence")] if "remanence" in columns else magnetisation.remanence
+        rates = (R_x if flat else np.sqrt(R_x**2 + Z_x**2)), R
+        found = point_energy(magnetisation, sources, (R + u, Z + w), (R_x + u_x, Z_x + w_x), rates, remanence, local)
+        magnetic, first, second = (area * parameters[1] * part for part in found)
+        gradient, hessian = gradient + first, hessian + second
+    elif sources:
+        magnetic = area * magnetic_energy_density(sources, scene.susceptibility or 0.0, R + u, Z + w)
         magnetic = parameters[1] * magnetic
         second, first = ca.hessian(magnetic, local)
         gradient, hessian = gradient + first, hessian + second

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import casadi as ca
 import numpy as np
@@ -18,12 +18,15 @@ from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
 from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
+from ..physics.along import Along
 from ..physics.loads import Load, on_hubs, over_reference
-from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
+from ..physics.magnetics import swept
+from ..physics.magnetisation import Magnetisation, position_energy_density, remanence_column, sources_that_act
 from ..physics.sheet import Sheet
 from ..physics.tension_field import strain_energy
 from ..threads import cached_property
 from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
+from .magnetic import wave_function
 from .replay import PointProgram, Replay, at_points
 
 if TYPE_CHECKING:
@@ -170,7 +173,8 @@ class Potential:
         if not space.n_free:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
-        self.sources = acting_sources(scene.sources, scene.susceptibility)  # nothing is built of others
+        self.sources = sources_that_act(scene)  # nothing is built of others
+        self.magnetisation = Magnetisation.of(scene) if self.sources else None
         self.loads = tuple(load for load in scene.loads if load.acts)
         if space.lids and any(type(load).over_projection is not Load.over_projection for load in self.loads):
             advice = (
@@ -191,6 +195,8 @@ class Potential:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
         if self.sheet is not None:
             columns |= self.sheet.columns(space.R, space.Z, space.s)
+        if self.magnetisation is not None and isinstance(self.magnetisation.remanence, Along):
+            columns["remanence"] = remanence_column(self.magnetisation, space.R, space.Z, space.s)
         if space.lift is not None:
             columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
@@ -357,6 +363,7 @@ class Potential:
         -------
         ndarray, shape (6, n)
             m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T, where the thickness is 1; zeros without sources and loads.
+            A magnetic energy that depends on the slope is not part of it, see :meth:`wave_energy`.
         """
         if not self.surrounded:
             return np.zeros((6, np.size(rho)))
@@ -368,10 +375,42 @@ class Potential:
         y = ca.SX.sym("y", 2)
         with casadi_answers_numpy():
             density = over_reference(self.loads, y[0], y[1]) + ca.SX(0)
-            if self.sources:
-                density += magnetic_energy_density(self.sources, self.scene.susceptibility or 0.0, y[0], y[1])
+            if self.sources and not self.tilts:
+                scene = self.scene
+                density += position_energy_density(self.sources, scene.susceptibility or 0.0, scene.saturation, y[0], y[1])
         hessian, gradient = ca.hessian(density, y)
         return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
+
+    @property
+    def tilts(self) -> bool:
+        """Whether the magnetic energy depends on the slope of the meridian."""
+        return self.magnetisation is not None and self.magnetisation.tilts
+
+    def wave_energy(self, rho: Array, eta: Array, slopes: tuple[Array, Array], R: Array, Z: Array, s: Array) -> Array | None:
+        """Second derivatives of a magnetic energy that depends on the slope, see :func:`.magnetic.wave_function`; None without one.
+
+        Parameters
+        ----------
+        rho, eta, slopes : ndarray
+            Position and its derivatives with respect to the arc length of the reference meridian.
+        R, Z, s : ndarray
+            Reference meridian.
+
+        Returns
+        -------
+        ndarray, shape (25, n)
+            In units of mu T, where the thickness is 1.
+        """
+        if not self.tilts:
+            return None
+        remanence = remanence_column(self.magnetisation, R, Z, s)
+        return at_points(self._wave_function, rho, eta, *slopes, R, np.zeros_like(rho) if remanence is None else remanence)
+
+    @cached_property
+    @BUILDING
+    def _wave_function(self) -> ca.Function:
+        with casadi_answers_numpy():
+            return wave_function(cast(Magnetisation, self.magnetisation), self.sources)
 
 
 def potential_of(scene: Scene) -> Potential:

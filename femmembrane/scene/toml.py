@@ -90,9 +90,12 @@ SHAPES: dict[str, Any] = {
 #: keys of [mesh] beside the file that holds the meridian
 FILE_KEYS = ("group", "divisions", "first", "last")
 SCENE_KEYS: dict[str, tuple[str, ...]] = {
-    "membrane": ("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
+    "membrane": (
+        *("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
+        *("saturation", "remanence", "remanence_direction", "remanence_transport"),
+    ),
     "mesh": ("degree",),
-    "effects": ("tension_field",),
+    "effects": ("tension_field", "demagnetization"),
 }
 #: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
 MAX_BYTES = 2**25
@@ -194,7 +197,7 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
         "scales": _arguments(scene.scales) if scene.scales else {},
     }
-    for name in ("thickness", "modulus"):
+    for name in ("thickness", "modulus", "remanence"):
         if callable(getattr(getattr(scene, name), "given", None)):
             raise InputError(
                 f"membrane.{name}", getattr(scene, name).given, "a function has no name in scene files; an expression or a table has"

@@ -25,6 +25,7 @@ from ..physics.magnetics import Source, distance_to_polyline
 from ..physics.materials import Material
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
+from .magnetisation import checked_magnetisation, refuse_magnetisation
 from .run import Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 
@@ -56,7 +57,7 @@ class Scene:
     sources : sequence of Source
         Magnetic sources around the axis. Without a source nothing magnetic is built.
     susceptibility : float, optional
-        Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source.
+        Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source, unless there is a remanence.
     radius_to_thickness : float, optional
         R0/T > 0; it enters the total stresses only. Left out: the ratio of the scales, or 1000 without scales.
     tension_field : bool
@@ -77,6 +78,17 @@ class Scene:
     prestretch : float
         How far the membrane is stretched before anything else acts: the rim of a flat disc or annulus is held at so many times its radius,
         the ends of a tube at so many times their height. P, V and lengths stay in units of the reference R0.
+    demagnetization : bool
+        Whether the sheet feels its own field: the normal flux density is continuous, so that inside H_n = h_n - m_n.
+    saturation : float, optional
+        mu0 Ms/sqrt(mu mu0) > 0 of the Langevin law. Left out: linear.
+    remanence : float, str, table or callable, optional
+        Residual magnetisation m_0 >= 0 carried by the sheet, as a flux density in units of sqrt(mu mu0). Along the meridian as for
+        ``thickness``, and then of either sign.
+    remanence_direction : {"normal", "meridional"}, optional
+        Required with a remanence.
+    remanence_transport : {"deformed", "rotated"}, optional
+        Whether it is carried by the deformation gradient (left out) or by the rotation alone (:mod:`~femmembrane.physics.magnetisation`).
 
     Raises
     ------
@@ -112,6 +124,11 @@ class Scene:
     thickness: Any = None
     modulus: Any = None
     prestretch: float = 1.0
+    demagnetization: bool = False
+    saturation: float | None = None
+    remanence: Any = None
+    remanence_direction: str | None = None
+    remanence_transport: str | None = None
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -143,6 +160,7 @@ class Scene:
             thickness=Along.of("membrane.thickness", self.thickness),
             modulus=Along.of("membrane.modulus", self.modulus),
             prestretch=_prestretch("membrane.prestretch", self.prestretch),
+            **checked_magnetisation(self),
         )
         if self.tension_field and getattr(self.material, "prestressed", False):
             allowed = "false is allowed with a pre-stressed strain energy: its width without stress is not known"
@@ -193,7 +211,8 @@ class Scene:
                 if not touched and _too_far(source):
                     reason = "the source is too far away for its field to be a number; move it"
                 raise InputError(f"{path}.{name}", getattr(source, name, source), reason)
-        if self.sources and self.susceptibility is None:
+        refuse_magnetisation(self)
+        if self.sources and self.susceptibility is None and self.remanence is None:
             raise InputError(
                 "membrane.susceptibility", None, "missing; there is a source, so give membrane.susceptibility (2.5 in the paper)"
             )
@@ -221,7 +240,8 @@ class Scene:
     @property
     def element_ends(self) -> tuple[float, ...]:
         """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet."""
-        return tuple(sorted({s for factor in (self.thickness, self.modulus) if factor is not None for s in factor.ends}))
+        factors = (self.thickness, self.modulus, self.remanence)
+        return tuple(sorted({s for factor in factors if isinstance(factor, Along) for s in factor.ends}))
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, unknown_name
+from ..physics.magnetisation import Magnetisation
 from ..physics.materials import Ogden
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 #: added to a strength, so that its square root can be differentiated at zero; strengths above 1e-284 do not change
 _TINY = 1e-300
+#: how a sheet is magnetised beside its susceptibility
+MAGNETISATION = ("demagnetization", "saturation", "remanence", "remanence_direction", "remanence_transport")
 #: parts of a scene that are lists, by their names
 _LISTS = {"source": "sources", "load": "loads"}
 
@@ -110,7 +113,9 @@ class Parameter:
         sources: tuple[Any, ...] = scene.sources
         loads: tuple[Any, ...] = scene.loads
         susceptibility = scene.susceptibility
-        if part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
+        if part == "membrane" and Magnetisation.of(scene) is not None:
+            susceptibility = value
+        elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
         elif rest.startswith("alpha."):
             material = _with_exponent(material, int(rest[6:]), value)
@@ -126,7 +131,7 @@ class Parameter:
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
-        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
+        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", *MAGNETISATION)
         return SimpleNamespace(**parts, **{name: getattr(scene, name) for name in kept})
 
     def _check_modulus(self, value: float, alpha: float) -> None:

@@ -5,7 +5,8 @@ layer at the rim. Such a state is told by what happens to it on finer meshes. Th
 at a pole it is level; the kinks that a mesh leaves there are errors of its slopes. They are small on ordinary meshes, and looking at them
 costs next to nothing. Where one is large the state is looked for on meshes that are finer and finer. One that is an approximation of
 something loses its kinks there, or at least keeps its stretches (the tip below a dipole takes many halvings to become round). A needle is
-not found again, or grows. A stress that a mesh leaves at an edge which is free to move in its plane is an error of the same kind.
+not found again, or grows. The cone at the pole of a sheet that is magnetised along its meridians is real, and no kink in this sense. A
+stress that a mesh leaves at an edge which is free to move in its plane is an error of the same kind.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
         return reason
     if reason := _pulled_at_an_edge(potential, state, scene):
         return reason
-    kinks = space.kinks(state.x)
+    kinks = _kinks(potential, state.x)
     worst = float(kinks.max(initial=0.0))
     if worst <= (_KINK_STRAIGHT if scene.degree == 1 else _KINK) or not space.n_elements > 1:  # one element is no mesh to judge
         return ""
@@ -182,7 +183,15 @@ def _lost_on_finer_meshes(potential: Potential, state: State, where: int) -> str
 
 def largest_kink(potential: Potential, x: Array) -> float:
     """The largest of :meth:`.Space.kinks`."""
-    return float(potential.space.kinks(x).max(initial=0.0))
+    return float(_kinks(potential, x).max(initial=0.0))
+
+
+def _kinks(potential: Potential, x: Array) -> Array:
+    """:meth:`.Space.kinks`, without those at poles of a sheet magnetised along its meridians: its cone is that of the membrane."""
+    kinks = potential.space.kinks(x)
+    if potential.magnetisation is not None and potential.magnetisation.meridional:
+        kinks[potential.space.n_elements - 1 :] = 0.0
+    return kinks
 
 
 def _found_again(onto: Potential, potential: Potential, state: State) -> State | None:

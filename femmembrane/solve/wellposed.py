@@ -3,6 +3,10 @@
 The plain membrane is in compression along the meridian: the Legendre-Hadamard condition fails. In a tension field no stress is
 compressive, but where the meridional one vanishes nothing holds the meridian against the pressure: it folds on a circle there.
 
+A magnetic energy that depends on the slope pulls at the meridian like a stress: a normal field compresses a sheet with self-field, and a
+tangential one supports it. In place of the meridional stress stands the *supporting* one then, the force that a turn of the meridian meets,
+:func:`supporting`.
+
 A stress that a mesh does not resolve has a sign of the mesh's: slopes of a layer or a needle swing about the true ones within an element.
 Compression is pronounced where it exceeds the variation of the stress from element to element, or holds in finer spaces too. Finer
 spaces may contradict it. Where the state is not found in them, nothing is known of the membrane but what the one mesh shows.
@@ -11,11 +15,13 @@ spaces may contradict it. Where the state is not found in them, nothing is known
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.space import HESSIAN_PAIRS
 from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
@@ -41,12 +47,15 @@ class IllPosed:
     slack : bool
     confirmed : bool
         Whether it is more than this mesh alone says: False where the state was not found in finer spaces, which could contradict.
+    turned : bool
+        Whether a magnetic energy that depends on the slope counts as well.
     """
 
     low: float
     high: float
     slack: bool
     confirmed: bool = True
+    turned: bool = False
 
     @property
     def status(self) -> Status:
@@ -60,6 +69,8 @@ class IllPosed:
         doubt = "" if self.confirmed else f" ({UNCONFIRMED})"
         if self.slack:
             return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there{doubt}"
+        if self.turned:
+            return f"stress and field do not hold the meridian at {self.where}: the Legendre-Hadamard condition fails there{doubt}"
         return f"the meridional stress is compressive at {self.where}: the Legendre-Hadamard condition fails there{doubt}"
 
 
@@ -89,36 +100,62 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
     scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
-    r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
+    r = potential.space.R.ravel()[unsupported(supporting(evaluation)[0], scale, slack)]
     if slack:
         r = np.append(r, _folds(potential, evaluation.x, scale))
-    return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
+    return IllPosed(float(r.min()), float(r.max()), slack, turned=potential.tilts) if r.size else None
+
+
+def supporting(evaluation: Evaluation) -> Array:
+    """The stresses that hold the sheet against short waves, shape (2, n_points): the mechanical ones.
+
+    Where an energy depends on the slope, the first is ``lambda_1^2`` times what is left of the density's second derivative with respect to
+    a turn of the meridian when its stretch gives way, per thickness: the density is elliptic along the meridian where it is positive, as
+    long as the one with respect to the stretch is.
+    """
+    potential = evaluation.potential
+    if not potential.tilts:
+        return evaluation.stress
+    space = potential.space
+    _, u_x, _, w_x = space.displacement_at_quadrature(evaluation.x)
+    rho_x, eta_x, stiffness = space.R_x + u_x, space.Z_x + w_x, evaluation.stiffness_density.reshape(-1, *space.R.shape)
+    uu, uw, ww = (stiffness[HESSIAN_PAIRS.index(pair)] for pair in ((1, 1), (1, 3), (3, 3)))
+    # times the square of the slope, and the weights taken out
+    along = (rho_x**2 * uu + 2 * rho_x * eta_x * uw + eta_x**2 * ww) / potential.bulk
+    mixed = ((rho_x**2 - eta_x**2) * uw + rho_x * eta_x * (ww - uu)) / potential.bulk
+    across = (eta_x**2 * uu - 2 * rho_x * eta_x * uw + rho_x**2 * ww) / potential.bulk
+    left = np.where(along > 0, across - mixed**2 / np.where(along > 0, along, 1.0), np.minimum(along, across))
+    return np.stack([left.ravel(), evaluation.stress[1]])
 
 
 def _least_meridional(evaluation: Evaluation) -> float:
-    return float(evaluation.stress[0].min(initial=0.0))
+    return float(supporting(evaluation)[0].min(initial=0.0))
 
 
-def compressed(potential: Potential, evaluation: Evaluation, component: int) -> IllPosed | None:
+#: the two stresses at the points of a state whose signs decide, shape (2, n_points)
+Supporting = Callable[[Evaluation], Array]
+
+
+def compressed(potential: Potential, evaluation: Evaluation, component: int, stresses: Supporting = supporting) -> IllPosed | None:
     """Where a principal stress (0 meridional, 1 hoop) is compressive, on any mesh; None where it is nowhere.
 
     A compression that finer spaces contradict is left out, see :func:`.finer_space.confirmed`.
     """
-    if not least_stress(evaluation, component):
+    if not least_stress(evaluation, component, stresses):
         return None
-    stress = evaluation.stress[component]
+    stress = stresses(evaluation)[component]
     sure: bool | None = _plain(stress.reshape(potential.space.R.shape))
     if not sure:
-        sure = confirmed(lambda found: least_stress(found.evaluation, component) < 0, potential, evaluation)
+        sure = confirmed(lambda found: least_stress(found.evaluation, component, stresses) < 0, potential, evaluation)
     if sure is False:
         return None
     r = potential.space.R.ravel()[unsupported(stress, np.abs(evaluation.stress).max(), False)]
-    return IllPosed(float(r.min()), float(r.max()), False, bool(sure))
+    return IllPosed(float(r.min()), float(r.max()), False, bool(sure), potential.tilts)
 
 
-def least_stress(evaluation: Evaluation, component: int) -> float:
+def least_stress(evaluation: Evaluation, component: int, stresses: Supporting = supporting) -> float:
     """The most compressive value of a principal stress (0 meridional, 1 hoop) on the mesh of a state; 0 where it is nowhere compressive."""
-    least = float(evaluation.stress[component].min(initial=0.0))
+    least = float(stresses(evaluation)[component].min(initial=0.0))
     if least >= 0:  # the usual case needs no scale
         return 0.0
     return least if unsupported(np.array(least), np.abs(evaluation.stress).max(), False) else 0.0

@@ -18,9 +18,10 @@ from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Verdict
 from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, least_stress
 from ..threads import one_thread
+from .acoustic import supporting_all
 from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
 from .mode_resolution import unresolved, unresolved_stress
-from .second_variation import PAIRS
+from .second_variation import pairs_of
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
 from .verdict import against, short_wave_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
@@ -108,7 +109,7 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     found = _smallest(operator, guess)
     shape = partial(azimuthal_shape, potential.space, operator.n)
     # compression that is the mesh's alone says that the mesh is not to be trusted
-    false = not potential.scene.tension_field and any(least_stress(evaluation, component) for component in (0, 1))
+    false = not potential.scene.tension_field and any(least_stress(evaluation, component, supporting_all) for component in (0, 1))
     part = np.inf if false else _unresolved(potential.space, operator, found.mode)
     return verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
 
@@ -119,7 +120,7 @@ def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float
     local = space.table[: 2 * space.n_quadrature, : space.degree + 1] @ layout.local(mode).reshape(3, space.degree + 1, -1)
     local = local.reshape(6, *space.R.shape)
     stress = np.stack([operator.response.s1, operator.response.s2])
-    return unresolved(space, operator.density, PAIRS, local, unresolved_stress(space, stress))
+    return unresolved(space, operator.density, pairs_of(operator.density), local, unresolved_stress(space, stress))
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ class ShortWaves:
 def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves]:
     """Where ever shorter waves with n >= 1 waves around the axis have ever lower eigenvalues; empty if nowhere.
 
-    A principal mechanical stress is compressive, so that the Legendre-Hadamard condition fails. In a tension field no stress is
+    A principal mechanical stress is compressive, or does not hold the sheet against a field that turns it, so that the Legendre-Hadamard
+    condition fails. In a tension field no stress is
     compressive. There the meridional stress may vanish; without hoop stress the operator of one n is as good as any.
     """
     if potential.scene.tension_field:
@@ -141,8 +143,9 @@ def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves
         return [] if bad is None else [ShortWaves(str(bad), bad.confirmed)]
     found = []
     for component, (name, lines) in enumerate((("meridional", "circles"), ("hoop", "meridians"))):
-        zone = compressed(potential, evaluation, component)
+        zone = compressed(potential, evaluation, component, supporting_all)
         if zone is not None:
             doubt = "" if zone.confirmed else f" ({UNCONFIRMED})"
-            found.append(ShortWaves(f"{name} stress compressive at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
+            what = f"{name} stress not held against the field" if zone.turned else f"{name} stress compressive"
+            found.append(ShortWaves(f"{what} at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
     return found

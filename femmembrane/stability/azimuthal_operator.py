@@ -40,9 +40,9 @@ class AzimuthalOperator:
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
-    density : ndarray, shape (18, n_quadrature, n_elements)
+    density : ndarray, shape (18 or 19, n_quadrature, n_elements)
         What ``band`` integrates: second derivatives of the quadratic form at the points, times the weights, in the order of
-        :data:`.second_variation.PAIRS`.
+        :func:`.second_variation.pairs_of`.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
     spin : ndarray, shape (n_free,), or None

@@ -107,10 +107,21 @@ def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
     space = potential.space
     displacement = space.displacement_at_quadrature(equilibrium.state)
     response = local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
-    smallest = np.minimum(response.W11, response.N1) / 2
+    along, mixed, across = _slope_moduli(response)
+    smallest = (along + across - np.hypot(along - across, 2 * mixed)) / 4 if response.sloped is not None else np.minimum(along, across) / 2
     at = int(np.argmin(smallest))
     value = float(smallest.ravel()[at])
-    return LegendreTest(value > 0, value, float((response.W11 * response.N1).min() / 4), float(space.R.ravel()[at]))
+    return LegendreTest(value > 0, value, float((along * across - mixed**2).min() / 4), float(space.R.ravel()[at]))
+
+
+def _slope_moduli(p: LocalResponse) -> tuple[Array, Array, Array]:
+    """F_y'y'/r along the meridian, mixed, and across it."""
+    if p.sloped is None:
+        return p.W11, np.zeros_like(p.W11), p.N1
+    (aa, ab), (_, bb) = p.sloped[0][2:4, 2:4]
+    t, z = p.t_rho, p.t_z
+    turned = t**2 * aa + 2 * t * z * ab + z**2 * bb, (t**2 - z**2) * ab + t * z * (bb - aa), z**2 * aa - 2 * t * z * ab + t**2 * bb
+    return p.W11 + turned[0], turned[1], p.N1 + turned[2]
 
 
 @one_thread
@@ -186,18 +197,28 @@ class _Coefficients:
         """Quantities that stay smooth up to the pole."""
         t, z = p.t_rho, p.t_z
         slopes = [p.W11 * t**2 + p.N1 * z**2, (p.W11 - p.N1) * t * z, p.W11 * z**2 + p.N1 * t**2]
-        return np.stack([*slopes, p.W12 * t, p.W12 * z, p.W22, *p.field[3:], p.rho, p.eta, p.rho_x])
+        values = [p.W12 * t, p.W12 * z, p.W22, *p.field[3:]]
+        if p.sloped is None:
+            return np.stack([*slopes, *values, p.rho, p.eta, p.rho_x])
+        H = p.sloped[0]  # of (a, b, a', b', q = a/r)
+        slopes = [own + more for own, more in zip(slopes, (H[2, 2], H[2, 3], H[3, 3]), strict=True)]
+        more = (H[2, 4], H[3, 4], H[4, 4], H[0, 0], H[0, 1], H[1, 1])
+        values = [own + part for own, part in zip(values, more, strict=True)]
+        return np.stack([*slopes, *values, p.rho, p.eta, p.rho_x, H[0, 2], H[0, 3], H[1, 2], H[1, 3], H[0, 4], H[1, 4]])
 
     def at(self, element: int, r: float) -> tuple[Array, Array, Array]:
         """F_y'y', F_yy' and F_yy at a radius of an element."""
         low, high = self.ends[element : element + 2]
         angle = np.arccos(np.clip((2 * r - low - high) / (high - low), -1, 1))
-        p1, p2, p3, g1, g2, w22, m1, m2, m3, rho, eta, rho_s = (np.cos(self._order * angle) @ self._series[element]).tolist()
+        p1, p2, p3, g1, g2, w22, m1, m2, m3, rho, eta, rho_s, *more = (np.cos(self._order * angle) @ self._series[element]).tolist()
         g, g_z, g_zz = over_projection(self.loads, eta)
         P = self.pressure - g_z
         slopes = r * np.array([[p1, p2], [p2, p3]])
         mixed = np.array([[g1 - self.pressure * eta + g, g2], [-P * rho, 0.0]])
         values = np.array([[w22 / r + r * m1, r * m2 - P * rho_s], [r * m2 - P * rho_s, r * m3 + g_zz * rho * rho_s]])
+        if more:  # of an energy that depends on the slope
+            mixed += r * np.array(more[:4]).reshape(2, 2)
+            values += np.array([[2 * more[4], more[5]], [more[5], 0.0]])
         return slopes, mixed, values
 
 

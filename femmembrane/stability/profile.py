@@ -12,9 +12,10 @@ from ..discretization.space import space_of_scene
 from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
+from ..physics.magnetisation import Magnetisation, remanence_column
 from ..physics.scales import Scales
 from ..physics.sheet import Sheet
-from ..physics.stress import total_stress
+from ..physics.stress import magnetised_stress, total_stress
 from ..physics.tension_field import cauchy_stress
 from ..quantities import quantity, si_values
 from ..scene import Scene
@@ -99,5 +100,11 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
     local = pressure - over_projection(scene.loads, eta)[1]
-    total = total_stress(mechanical, local, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
+    surroundings = local, scene.radius_to_thickness, h, tangent
+    magnetisation = Magnetisation.of(scene)
+    if magnetisation is None:
+        total = total_stress(mechanical, *surroundings, scene.susceptibility or 0.0)
+    else:
+        stretches, remanence = (np.exp(e1), np.exp(e2)), remanence_column(magnetisation, R, Z, s)
+        total = magnetised_stress(mechanical, *surroundings, stretches, magnetisation, remanence)
     return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total)

@@ -21,6 +21,9 @@ there counts too: by parts -Int eta_x (a^2 + 2 n a c + c^2) + rho (2 a b_x + n c
 lid is a film that its edge makes harmonic, b (r/rho)^n cos n theta to first order, further [n rho a b] of the two ends. A load g(eta) over
 the projected area adds the first form with g for eta in its first term and g' before the others, and g'' rho rho_x b^2.
 
+A magnetic energy that depends on the slope (:mod:`..physics.magnetisation`) adds two forms of its second derivatives, in the even variables
+(a, b, a', b', q) and in the odd ones (c, c', e, f): they do not mix, and do not know n.
+
 Integrals over theta are normalised as for n = 0, 2 pi instead of pi, so that n = 0 is the axisymmetric operator entry by entry; eigenvalues
 do not depend on it. c plays no part at n = 0.
 """
@@ -30,6 +33,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -66,6 +70,8 @@ PAIRS = (
     (_B, _B),
     (_BX, _BX),
 )
+#: the pairs where an energy depends on the slope
+SLOPED_PAIRS = (*PAIRS, (_B, _BX))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +88,8 @@ class LocalResponse:
     A, B : in-plane shear moduli, continuous through l1 = l2
     field : ndarray, shape (6, ...)
         m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta of the energy density of sources and loads.
+    sloped : tuple of two ndarrays, shapes (5, 5, ...) and (4, 4, ...), or None
+        Second derivatives of an energy density of sources that depends on the slope, see :func:`~.potential.magnetic.wave_function`.
     """
 
     rho: Array
@@ -100,6 +108,7 @@ class LocalResponse:
     A: Array
     B: Array
     field: Array
+    sloped: tuple[Array, Array] | None = None
 
 
 def local_response(
@@ -123,11 +132,13 @@ def local_response(
     A = _stress_quotient(potential, e1, e2, s1 - s2, d) * _over_sinh(d) / (2 * l1 * l2)
     B = ((l1**2 + l2**2) / 2 * A - (s1 + s2) / 2) / (l1 * l2)
     field = potential.field_energy(rho, eta).reshape(6, *shape)
+    sloped = _sloped(potential, (R, R_x, Z, Z_x), (rho, eta, rho_x, eta_x), s)
     if potential.sheet is not None:
         thickness, modulus = potential.sheet.factors(R, Z, R if s is None else s)
         force = thickness * modulus
         s1, s2, d11, d12, d22, A, B = (part * force for part in (s1, s2, d11, d12, d22, A, B))
         field = field * thickness
+        sloped = None if sloped is None else (sloped[0] * thickness, sloped[1] * thickness)
     return LocalResponse(
         rho=rho,
         eta=eta,
@@ -145,7 +156,21 @@ def local_response(
         A=A,
         B=B,
         field=field,
+        sloped=sloped,
     )
+
+
+def _sloped(potential: Potential, meridian: tuple[Array, ...], deformed: tuple[Array, ...], s: Array | None) -> tuple[Array, Array] | None:
+    if not potential.tilts:
+        return None
+    (R, R_x, Z, Z_x), (rho, eta, rho_x, eta_x) = meridian, deformed
+    J = np.hypot(R_x, Z_x)
+    found: Any = potential.wave_energy(rho, eta, (rho_x / J, eta_x / J), R, Z, R if s is None else s)
+    even, odd = np.zeros((5, 5, *R.shape)), np.zeros((4, 4, *R.shape))
+    pairs = [(block, i, j) for block in (even, odd) for i in range(len(block)) for j in range(i, len(block))]
+    for (block, i, j), row in zip(pairs, found, strict=True):
+        block[i, j] = block[j, i] = row.reshape(R.shape)
+    return even, odd
 
 
 def _over_sinh(d: Array) -> Array:
@@ -181,7 +206,7 @@ def response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse:
 
 
 def second_variation(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: float, n: int) -> list[Array]:
-    """Second derivatives of the quadratic form at the points, times the weights, in the order of PAIRS."""
+    """Second derivatives of the quadratic form at the points, times the weights, in the order of PAIRS or SLOPED_PAIRS."""
     J = np.hypot(space.R_x, space.Z_x)
     area = space.weights * space.R * J
     xx, xo, oo = area / J**2, area / (J * space.R), area / space.R**2  # of two slopes, a slope and a value, two values
@@ -213,9 +238,34 @@ def second_variation(space: Space, r: LocalResponse, loads: Sequence[Load], pres
     parts = [_volume_density(space, r, -pressure * inside, n)]
     if loads:
         parts.append(_projected_density(r, g, g_z, n))
+    if r.sloped is not None:
+        parts.append(_sloped_density(space, r.sloped, n))
     for pair, part in (item for added in parts for item in added.items()):
         entries[pair] = entries[pair] + part if pair in entries else part
-    return [entries.get(pair, np.zeros_like(area)) for pair in PAIRS]
+    return [entries.get(pair, np.zeros_like(area)) for pair in (PAIRS if r.sloped is None else SLOPED_PAIRS)]
+
+
+def pairs_of(density: Array) -> tuple[tuple[int, int], ...]:
+    """The pairs that the rows of :func:`second_variation` belong to."""
+    return PAIRS if len(density) == len(PAIRS) else SLOPED_PAIRS
+
+
+def _sloped_density(space: Space, sloped: tuple[Array, Array], n: int) -> dict[tuple[int, int], Array]:
+    """Second derivatives of an energy that depends on the slope, times the weights, by the chain rule for its local variables."""
+    J = np.hypot(space.R_x, space.Z_x)
+    area = space.weights * space.R * J
+    one, by_J, by_R = np.ones_like(J), 1 / J, 1 / space.R
+    even = ({_A: one}, {_B: one}, {_AX: by_J}, {_BX: by_J}, {_A: by_R, _C: n * by_R})
+    odd = ({_C: one}, {_CX: by_J}, {_A: -n * by_R, _C: -by_R}, {_B: -n * by_R})
+    entries: dict[tuple[int, int], Array] = {}
+    for block, variables in zip(sloped, (even, odd), strict=True):
+        for i, first in enumerate(variables):
+            for j, second in enumerate(variables):
+                for u, du in first.items():
+                    for v, dv in second.items():
+                        if u <= v:
+                            entries[u, v] = entries.get((u, v), 0.0) + block[i, j] * du * dv * area
+    return entries
 
 
 def _volume_density(space: Space, r: LocalResponse, work: Array, n: int) -> dict[tuple[int, int], Array]:

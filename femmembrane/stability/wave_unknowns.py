@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..discretization.numbering import band_of
 from ..discretization.space import Space
 from ..potential import Array
-from .second_variation import PAIRS, VALUES
+from ..threads import cached_property
+from .second_variation import PAIRS, SLOPED_PAIRS, VALUES
 
 #: the fields a (radial), c (around the axis) and b (vertical) in the order of their coefficients
 RADIAL, AROUND, VERTICAL = range(3)
@@ -59,20 +60,29 @@ class WaveUnknowns:
             rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
             rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
         self._values = space.table[: space.n_quadrature, :n_local]
-        outer = []
-        for i, j in PAIRS:
-            product = np.einsum("qa,qb->abq", rows[i], rows[j])
-            outer.append(product if i == j else product + product.transpose(1, 0, 2))
-        self._table = np.ascontiguousarray(np.stack(outer, axis=2).reshape((3 * n_local) ** 2, -1))
+        self._rows = rows
+        self._table = self._products(PAIRS)
         kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
         row, column = np.broadcast_arrays(self.gather[:, None, :], self.gather[None, :, :])
         inside = (row < self.n_free) & (column < self.n_free)
         self._band_index = np.where(inside, column * depth + 2 * kd + row - column, self.n_free * depth).ravel()
 
+    def _products(self, pairs: tuple[tuple[int, int], ...]) -> Array:
+        rows, outer = self._rows, []
+        for i, j in pairs:
+            product = np.einsum("qa,qb->abq", rows[i], rows[j])
+            outer.append(product if i == j else product + product.transpose(1, 0, 2))
+        return np.ascontiguousarray(np.stack(outer, axis=2).reshape(rows.shape[2] ** 2, -1))
+
+    @cached_property
+    def _sloped_table(self) -> Array:
+        return self._products(SLOPED_PAIRS)
+
     def assemble(self, density: Array) -> Array:
-        """Integrate second derivatives in the order of PAIRS, shape (18, n_quadrature, n_elements), to a band matrix."""
+        """Integrate second derivatives in the order of :func:`pairs_of`, shape (18 or 19, n_quadrature, n_elements), to a band matrix."""
+        table = self._table if len(density) == len(PAIRS) else self._sloped_table
         n_elements, n_local = density.shape[-1], self.gather.shape[0]
-        local = (self._table @ density.reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
+        local = (table @ density.reshape(-1, n_elements)).reshape(n_local, n_local, n_elements)
         for row, element in self.flips:
             local[row, :, element] *= -1
             local[:, row, element] *= -1

@@ -12,8 +12,8 @@ are (e_2, eta, d, phi) with d = e_1 - e_2: at the pole d and phi vanish and ever
 
     y' = S y/r + f(r, y),      S = [[0 0 1 0], [0 0 0 0], [0 0 -2 0], [0 0 0 -1]],      f(0, y) = (0, 0, 0, (m_eta - P lambda^2)/W_1)
 
-and at the rim e_2 = eta = 0, or what its own place asks for. The energies, the volume and the force of the sources follow from the formulas of the material and the
-sources.
+and at the rim e_2 = eta = 0, or what its own place asks for. The energies, the volume and the force of the sources follow from the
+formulas of the material and the sources.
 """
 
 from __future__ import annotations

@@ -99,8 +99,10 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     slack = potential.scene.tension_field
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
-    scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
-    r = potential.space.R.ravel()[unsupported(supporting(evaluation)[0], scale, slack)]
+    scale = np.abs(evaluation.stress).max(initial=0.0)
+    if not scale and not potential.strained:  # the unloaded membrane is not slack but at rest, where its ends do not bring it closer
+        return None
+    r = potential.space.R.ravel()[unsupported(supporting(evaluation)[0], scale, slack) | (not scale)]
     if slack:
         r = np.append(r, _folds(potential, evaluation.x, scale))
     return IllPosed(float(r.min()), float(r.max()), slack, turned=potential.tilts) if r.size else None

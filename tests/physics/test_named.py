@@ -93,6 +93,12 @@ def test_a_changed_material_has_no_name():
     assert Parameter(scene, "material.ratio").scene_at(0.2).to_dict()["material"] == {"model": "mooney-rivlin", "ratio": 0.2}
 
 
+def test_its_source_is_cited():
+    scene = fm.Scene(material=fm.material("vhb-4910"), mesh=fm.disc(4))
+    assert "10.1016/j.crme.2015.11.004" in fm.cite(fm.inflate(scene, volumes=[0.5]))
+    assert "10.1016/j.crme.2015.11.004" not in fm.cite(fm.inflate(scene.replace(material=fm.NeoHookean()), volumes=[0.5]))
+
+
 def test_refusals():
     with pytest.raises(fm.InputError, match=r"material.name = 'treloar': unknown; .*treloar-ogden"):
         fm.material("treloar")

@@ -71,11 +71,11 @@ def test_runs_and_traces_pass_through_flat():
 
 
 def test_a_balloon_that_is_tense_at_rest():
-    """Without pressure it shrinks by p in radius; 2 tau/R holds it where it rests."""
+    """P = 2 p^3 (1/l - 1/l^7) at p times less than the stretch l; where it rests, l = p, that is 2 tau."""
     balloon = fm.Scene(material=TENSE, mesh=fm.sphere(12), degree=3)
-    volumes = [4 / 3 * np.pi / P**3, 4 / 3 * np.pi]
-    found = [fm.equilibrium(balloon, volume=volume, solver="newton").pressure for volume in volumes]
-    assert found == pytest.approx([0, 2 * TENSION], rel=1e-7, abs=1e-7)
+    for stretch in (1.2, P):
+        eq = fm.equilibrium(balloon, volume=4 / 3 * np.pi * (stretch / P) ** 3, solver="newton")
+        assert eq.pressure == pytest.approx(2 * P**3 * (1 / stretch - stretch**-7), rel=1e-7)
 
 
 @pytest.mark.parametrize(

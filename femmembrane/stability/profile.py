@@ -15,7 +15,7 @@ from ..physics.magnetics import magnetic_field
 from ..physics.scales import Scales
 from ..physics.sheet import Sheet
 from ..physics.stress import total_stress
-from ..physics.tension_field import cauchy_stress
+from ..physics.tension_field import cauchy_stress, strain_energy
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
     e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
     rho, eta = R + u, Z + w
-    mechanical = cauchy_stress(scene.material, scene.tension_field, e1, e2)
+    mechanical = cauchy_stress(strain_energy(scene.material, scene.tension_field), e1, e2)
     if (sheet := Sheet.of(scene)) is not None:
         modulus = sheet.factors(R, Z, s)[1]
         mechanical = (modulus * mechanical[0], modulus * mechanical[1])

@@ -40,6 +40,9 @@ from .physics.materials import MooneyRivlin as MooneyRivlin
 from .physics.materials import NeoHookean as NeoHookean
 from .physics.materials import Ogden as Ogden
 from .physics.materials import Varga as Varga
+from .physics.named import MaterialData as MaterialData
+from .physics.named import material as material
+from .physics.named import material_data as material_data
 from .physics.scales import Scales as Scales
 from .physics.sources import Loop as Loop
 from .physics.sources import Solenoid as Solenoid

@@ -91,7 +91,7 @@ class Ogden:
 
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
-    convention: str = field(default=CONVENTIONS[0], metadata={"quiet": True})
+    convention: str = field(default=CONVENTIONS[0], repr=False, metadata={"quiet": True})
 
     def __post_init__(self) -> None:
         for key in ("mu", "alpha"):
@@ -144,7 +144,8 @@ class Ogden:
     def treloar(cls) -> Ogden:
         """Three terms fitted to Treloar's vulcanised rubber: Ogden, Proc. R. Soc. Lond. A 326 (1972).
 
-        mu = (6.3, 0.012, -0.1) kg/cm^2 with alpha = (1.3, 5, -2): a shear modulus of 4.225 kg/cm^2 (0.414 MPa), the unit here.
+        mu = (6.3, 0.012, -0.1) kg/cm^2 with alpha = (1.3, 5, -2): a shear modulus of 4.225 kg/cm^2 (0.414 MPa), the unit here. Its full
+        record is ``material_data("treloar-ogden")``.
         """
         return cls(tuple(m / 4.225 for m in (6.3, 0.012, -0.1)), (1.3, 5.0, -2.0))
 

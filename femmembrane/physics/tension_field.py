@@ -25,6 +25,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from .materials import Material
 
 Width = Callable[[Any], tuple[Any, Any]]
@@ -44,21 +46,34 @@ class TensionField:
 
     material: Material
 
+    def natural(self, e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
+        """See :func:`natural_strains`."""
+        return natural_strains(e1, e2, self.width)
+
+    def beyond(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        """Strains beyond natural width, (g_1, g_2): they have the signs that decide where the membrane is taut."""
+        return e1 - self.width(np.maximum(e2, 0))[0], e2 - self.width(np.maximum(e1, 0))[0]
+
     def energy(self, e1: Any, e2: Any) -> Any:
-        n1, n2, _, _ = natural_strains(e1, e2, self.width)
+        n1, n2, _, _ = self.natural(e1, e2)
         return self.material.energy(n1, n2)
 
     def stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
-        n1, n2, taut1, taut2 = natural_strains(e1, e2, self.width)
+        n1, n2, taut1, taut2 = self.natural(e1, e2)
         s1, s2 = self.material.stress(n1, n2)
         return taut1 * s1, taut2 * s2  # at natural width the stress across is zero: here exactly
 
     def tangent(self, e1: Any, e2: Any) -> tuple[Any, Any, Any]:
-        n1, n2, taut1, taut2 = natural_strains(e1, e2, self.width)
+        n1, n2, taut1, taut2 = self.natural(e1, e2)
         s11, s12, s22 = self.material.tangent(n1, n2)
         across1, across2 = self.width(n2)[1], self.width(n1)[1]
         # in simple tension d(s_1)/d(e_1) = s_11 + s_12 dn_2/de_1, which is s_11 - s_12/2 where the volume stays
         return taut1 * (s11 + (1 - taut2) * s12 * across2), taut1 * taut2 * s12, taut2 * (s22 + (1 - taut1) * s12 * across1)
+
+    def volume_ratio(self, e1: Any, e2: Any) -> Any:
+        """Volume ratio at natural strains: 1 unless the material says otherwise."""
+        own = getattr(self.material, "volume_ratio", None)
+        return 1.0 if own is None else own(*self.natural(e1, e2)[:2])
 
     @property
     def width(self) -> Width:
@@ -86,14 +101,13 @@ def natural_strains(e1: Any, e2: Any, width: Width = _incompressible) -> tuple[A
     return taut1 * e1 + (1 - taut1) * least1, taut2 * e2 + (1 - taut2) * least2, taut1, taut2
 
 
-def cauchy_stress(material: Material, tension_field: bool, e1: Any, e2: Any) -> tuple[Any, Any]:
-    """Principal Cauchy stresses: lambda_i dW/dlambda_i over the volume ratio, which is 1 unless the material says otherwise."""
-    s1, s2 = strain_energy(material, tension_field).stress(e1, e2)
-    ratio = getattr(material, "volume_ratio", None)
+def cauchy_stress(law: Material, e1: Any, e2: Any) -> tuple[Any, Any]:
+    """Principal Cauchy stresses: lambda_i dW/dlambda_i over the volume ratio, which is 1 unless the law says otherwise."""
+    s1, s2 = law.stress(e1, e2)
+    ratio = getattr(law, "volume_ratio", None)
     if ratio is None:
         return s1, s2
-    n1, n2 = natural_strains(e1, e2, natural_width(material))[:2] if tension_field else (e1, e2)
-    volume = ratio(n1, n2)
+    volume = ratio(e1, e2)
     return s1 / volume, s2 / volume
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..origin import package_version
+from ..physics.named import material_data
 
 if TYPE_CHECKING:
     from .branch import Branch
@@ -89,5 +90,7 @@ def cite(branch: Branch | None = None) -> str:
             raise InputError("branch", branch, "a Branch is allowed")
         keys += ["ipopt2006"] if branch.solver == "ipopt" else []
         keys += _TENSION_FIELD if branch.scene.tension_field else ()
+    named = getattr(branch.scene.material, "named", None) if branch is not None else None
     own = ["@software{femmembrane,", "  title   = {femmembrane},", f"  version = {{{package_version()}}},", "}"]
-    return "\n\n".join(["\n".join(own), *(_ENTRIES[key] for key in keys)])
+    data = [] if named is None else [f"@misc{{{named},\n  note    = {{{material_data(named).citation}}},\n}}"]
+    return "\n\n".join(["\n".join(own), *(_ENTRIES[key] for key in keys), *data])

@@ -4,6 +4,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
 
     title                        Scene.title
     [material]  model, ...       a class of MATERIALS and its arguments
+                name             or a real material by name, :func:`~femmembrane.material`
     [membrane]                   attributes of Scene, listed in SCENE_KEYS
     [[source]]  kind, ...        a class of SOURCES and its arguments
     [[load]]    kind, ...        a class of LOADS and its arguments
@@ -44,6 +45,7 @@ from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
 from ..physics.loads import HubForce, Hydrostatic, Weight
 from ..physics.magnetics import Dipole
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
+from ..physics.named import material
 from ..physics.scales import Scales
 from ..physics.sources import Loop, Solenoid, Uniform, Wire
 from ..physics.tabulated import Tabulated
@@ -166,7 +168,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         _refuse_unknown(table, tables[table], SCENE_KEYS[table])
     scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
     return dict(
-        material=_build_one_of("material", "model", MATERIALS, tables["material"]),
+        material=_build_material(tables["material"]),
         sources=_build_list("source", SOURCES, data.get("source", ()), scales),
         loads=_build_list("load", LOADS, data.get("load", ())),
         mesh=_build_mesh(tables["mesh"], folder),
@@ -188,7 +190,7 @@ def tables_of(scene: Scene) -> dict[str, Any]:
     """
     tables: dict[str, Any] = {
         "title": scene.title,
-        "material": _describe("material", "model", MATERIALS, scene.material),
+        "material": _describe_material(scene.material),
         **{table: {name: getattr(scene, name) for name in names} for table, names in SCENE_KEYS.items() if table != "mesh"},
         "source": [_describe("source", "kind", SOURCES, source) for source in scene.sources],
         "load": [_describe("load", "kind", LOADS, load) for load in scene.loads],
@@ -222,7 +224,7 @@ def _known_keys() -> dict[str, set[str]]:
         return {f.name for c in classes for f in fields(c)}
 
     keys = {table: set(names) for table, names in SCENE_KEYS.items()}
-    keys["material"] = {"model"} | arguments(*MATERIALS.values())
+    keys["material"] = {"model", "name"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
     keys["mesh"] |= {"shape", "file", *FILE_KEYS} | arguments(*SHAPES.values())
@@ -260,6 +262,19 @@ def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: 
         raise InputError(f"{path}.{selector}", None, "missing; known: " + ", ".join(sorted(registry)))
     choice(f"{path}.{selector}", table[selector], registry)
     return _build(path, registry[table[selector]], table, (selector, *beside))
+
+
+def _build_material(table: Mapping[str, Any]) -> Any:
+    if "name" not in table:
+        return _build_one_of("material", "model", MATERIALS, table)
+    for key in table.keys() - {"name"}:
+        raise InputError(f"material.{key}", table[key], "not allowed beside material.name, which says all of the material; leave one out")
+    return material(table["name"])
+
+
+def _describe_material(value: Any) -> dict[str, Any]:
+    name = getattr(value, "named", None)
+    return _describe("material", "model", MATERIALS, value) if name is None else {"name": name}
 
 
 def _build_mesh(table: Mapping[str, Any], folder: Path) -> Meridian:

@@ -108,7 +108,7 @@ class Segment(Generic[Point]):
 
     def _root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> tuple[float, Located[Point]]:
         try:
-            share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60)
+            share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60, disp=False)
         except SolveError:  # another branch crosses at the fold, as where a branch of pears ends on that of the spheres
             low, high = self.narrowed(function, low, high)
             return low, Located(kind, self.at(low), (high - low) * self.length + self.spread(low, high))

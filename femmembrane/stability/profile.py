@@ -16,7 +16,7 @@ from ..physics.magnetisation import Magnetisation, remanence_column
 from ..physics.scales import Scales
 from ..physics.sheet import Sheet
 from ..physics.stress import magnetised_stress, total_stress
-from ..physics.tension_field import cauchy_stress
+from ..physics.tension_field import cauchy_stress, strain_energy
 from ..quantities import quantity, si_values
 from ..scene import Scene
 
@@ -92,7 +92,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
     e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
     rho, eta = R + u, Z + w
-    mechanical = cauchy_stress(scene.material, scene.tension_field, e1, e2)
+    mechanical = cauchy_stress(strain_energy(scene.material, scene.tension_field), e1, e2)
     if (sheet := Sheet.of(scene)) is not None:
         modulus = sheet.factors(R, Z, s)[1]
         mechanical = (modulus * mechanical[0], modulus * mechanical[1])

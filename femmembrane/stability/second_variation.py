@@ -40,7 +40,7 @@ import numpy as np
 from ..discretization.space import Space
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, over_projection
-from ..physics.tension_field import natural_strains, natural_width
+from ..physics.tension_field import TensionField
 from ..potential import Array, Potential
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
@@ -187,7 +187,7 @@ def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Arr
     """
     close = np.abs(d) < EQUAL_STRETCH
     if potential.scene.tension_field:  # where one stress is gone, the difference is odd but not smooth, and has no digits to lose
-        _, _, taut1, taut2 = natural_strains(e1, e2, natural_width(potential.scene.material))
+        _, _, taut1, taut2 = TensionField(potential.scene.material).natural(e1, e2)
         close &= taut1 == taut2
     quotient: Array = difference / np.where(close, 1.0, d)
     if close.any():

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ..checks import choice
 from ..discretization.space import Space, space_of_scene
-from ..physics.tension_field import natural_width
+from ..physics.tension_field import TensionField
 from ..potential import potential_of
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
@@ -172,8 +172,7 @@ def _runs(flags: Sequence[bool]) -> list[tuple[int, int]]:
 def _mechanical(profile: Profile, scene: Scene) -> tuple[Array, Array]:
     if not scene.tension_field:
         return profile.mechanical
-    (e1, e2), width = profile.strain, natural_width(scene.material)
-    return e1 - width(np.maximum(e2, 0))[0], e2 - width(np.maximum(e1, 0))[0]
+    return TensionField(scene.material).beyond(*profile.strain)
 
 
 def _tiles(space: Space, deciding: _Stresses) -> tuple[list[int], Array]:

@@ -78,9 +78,9 @@ def test_uniaxial_tension_and_equibiaxial_stretch(nu, stretch):
     both = stretch**2 * 2 * (1 + nu) / (1 - nu) * E
     assert material.stress(e, e) == pytest.approx((both, both), rel=1e-13)
     thickness = np.sqrt(1 - 4 * nu / (1 - nu) * E)
-    assert cauchy_stress(material, False, e, e) == pytest.approx((both / (stretch**2 * thickness),) * 2, rel=1e-13)
+    assert cauchy_stress(material, e, e) == pytest.approx((both / (stretch**2 * thickness),) * 2, rel=1e-13)
     if stretch > 1:  # wrinkled, the stress of simple tension
-        relaxed = cauchy_stress(material, True, e, across - 0.1)
+        relaxed = cauchy_stress(TensionField(material), e, across - 0.1)
         assert relaxed == pytest.approx((stretch * 2 * (1 + nu) * E / (1 - 2 * nu * E), 0), rel=1e-12)
         assert relaxed[1] == 0
 
@@ -176,6 +176,27 @@ def test_verdicts_and_zones_know_the_natural_width():
     zones = eq.zones("mechanical")
     assert zones.kinds == ("taut", "radial", "taut")
     assert eq.verdict("pressure").stable
+
+
+def test_a_balloon_breathes():
+    """Uniform radial motion: W'' - 2 l P = 2 (1 + nu)/(1 - nu) (l^2 + 1) is among the eigenvalues for n = 0 at constant pressure."""
+    nu, stretch = 0.3, 1.1
+    scene = fm.Scene(material=fm.Hooke(nu), mesh=fm.sphere(10), degree=4)
+    eq = fm.equilibrium(scene, volume=4 / 3 * np.pi * stretch**3, solver="newton")
+    found = [mode.eigenvalue for mode in eq.frequencies(azimuthal=0, count=6, control="pressure")]
+    expected = 2 * (1 + nu) / (1 - nu) * (stretch**2 + 1)
+    assert min(abs(value / expected - 1) for value in found) < 1e-6
+
+
+@pytest.mark.parametrize("relaxed", [False, True])
+def test_pressure_is_the_slope_of_the_energy(relaxed):
+    """dE/dV = P, wrinkled or not."""
+    mesh = fm.cylinder(elements=12, length=3.0)
+    scene = fm.Scene(material=RUBBER, mesh=mesh, prestretch=1.2, tension_field=relaxed, degree=3)
+    middle = fm.equilibrium(scene, pressure=-0.02 if relaxed else 0.1, solver="newton")
+    h = 1e-4
+    low, high = (fm.equilibrium(scene, volume=middle.volume + d, solver="newton", start=middle) for d in (-h, h))
+    assert (high.energy - low.energy) / (2 * h) == pytest.approx(middle.pressure, rel=1e-5)
 
 
 def test_nobody_else_pays():

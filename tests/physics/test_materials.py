@@ -12,8 +12,10 @@ import femmembrane as fm
 from femmembrane.accuracy.shooting import shoot
 from femmembrane.accuracy.strong_form import Guess
 from femmembrane.physics.tension_field import TensionField
-from femmembrane.potential import Potential
+from femmembrane.potential import Family, Potential
 from femmembrane.potential.expressions import casadi_answers_numpy
+from femmembrane.scene.variation import Parameter, names
+from femmembrane.solve.guess import guess_at_volume
 from tests.cases import disc_scene
 
 getcontext().prec = 60
@@ -300,14 +302,36 @@ def test_the_softest_stretch_of_soft_tissue():
 
 
 def test_varied_coefficients_of_a_polynomial_keep_their_sum():
-    from femmembrane.scene.variation import Parameter
-
     scene = fm.Scene(material=fm.Polynomial(c10=0.4, c01=0.1, c20=0.01), mesh=fm.disc(4))
     assert Parameter(scene, "material.c01").scene_at(0.2).material == fm.Polynomial(c10=0.3, c01=0.2, c20=0.01)
     assert Parameter(scene, "material.c20").scene_at(0.2).material == fm.Polynomial(c10=0.4, c01=0.1, c20=0.2)
 
 
 # --- membranes
+
+
+NEW = [
+    fm.GentGent(97.2, 0.3),
+    fm.LopezPamies(0.75, 1.5, 0.3),
+    fm.ExtendedTube(0.5, 0.15, 0.25),
+    fm.VerondaWestmann(0.5),
+    fm.Hooke(0.3),
+    fm.Polynomial(c10=0.4, c01=0.1, c20=0.01),
+]
+
+
+@pytest.mark.parametrize("material", NEW, ids=lambda m: type(m).__name__)
+def test_every_number_can_be_varied(material):
+    """The family of a number, a symbol in it, is the potential of the scene with its value."""
+    scene = disc_scene(material, elements=4)
+    for name in names(scene):
+        parameter = Parameter(scene, name)
+        value = parameter.value * 1.01 + 1e-3
+        there = Potential(parameter.scene_at(value))
+        x = guess_at_volume(there, 0.3)
+        one, other = Family(scene, parameter.vary).evaluate(x, 0.2, value), there.evaluate(x, 0.2)
+        assert one.elastic_energy == pytest.approx(other.elastic_energy, rel=1e-12), name
+        assert one.gradient == pytest.approx(other.gradient, rel=1e-10, abs=1e-13), name
 
 
 def test_scene_files(tmp_path):

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.accuracy.shooting import shoot
+from femmembrane.accuracy.strong_form import Guess
 from tests.cases import disc_scene
 
 P = 1.5
@@ -53,6 +55,13 @@ def test_the_same_disc_stretched():
         assert one.pressure == pytest.approx(P**3 * other.pressure, rel=1e-9)
 
 
+def test_shooting_agrees():
+    eq = fm.equilibrium(disc_scene(TENSE, elements=16, degree=6), center_height=0.4)
+    found = shoot(DISC, center_height=0.4, guess=Guess.of(eq))
+    assert found.converged
+    assert (eq.pressure, eq.volume) == pytest.approx((found.pressure, found.volume), rel=1e-9)
+
+
 def test_runs_and_traces_pass_through_flat():
     branch = fm.pressurize(DISC, pressures=np.linspace(-0.2, 0.2, 5))
     assert branch.column("volume") == pytest.approx(-branch.column("volume")[::-1], rel=1e-9, abs=1e-15)
@@ -62,11 +71,11 @@ def test_runs_and_traces_pass_through_flat():
 
 
 def test_a_balloon_that_is_tense_at_rest():
-    """Without pressure it shrinks by p in radius; 2 tau/R holds it where it rests."""
+    """P = 2 p^3 (1/l - 1/l^7) at p times less than the stretch l; where it rests, l = p, that is 2 tau."""
     balloon = fm.Scene(material=TENSE, mesh=fm.sphere(12), degree=3)
-    loose, held = (fm.equilibrium(balloon, solver="newton", **load) for load in ({"pressure": 0.0}, {"volume": 4 / 3 * np.pi}))
-    assert loose.volume == pytest.approx(4 / 3 * np.pi / P**3, rel=1e-6)
-    assert held.pressure == pytest.approx(2 * TENSION, rel=1e-7)
+    for stretch in (1.2, P):
+        eq = fm.equilibrium(balloon, volume=4 / 3 * np.pi * (stretch / P) ** 3, solver="newton")
+        assert eq.pressure == pytest.approx(2 * P**3 * (1 / stretch - stretch**-7), rel=1e-7)
 
 
 @pytest.mark.parametrize(

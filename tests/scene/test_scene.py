@@ -200,7 +200,7 @@ NAN, INF = math.nan, math.inf
 
 REFUSED = [
     # tables and keys
-    ({}, "material.model", "missing; known: arruda-boyce, extended-tube, fung, gent, gent-gent, lopez-pamies, mooney-rivlin"),
+    ({}, "material.model", "missing; known: arruda-boyce, extended-tube, fung, gent, gent-gent, hooke, lopez-pamies"),
     (plain(materal={}), "materal", "did you mean 'material'"),
     (plain(effects={"tension_feild": True}), "effects.tension_feild", "did you mean 'tension_field'?"),
     (plain(effects={"tension_field": 1}), "effects.tension_field", "true or false"),

@@ -1,9 +1,12 @@
 """All equilibria at a load, and runs that meet a limit."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.solve.segment import Segment
 from tests.cases import OGDEN, disc_scene
 
 
@@ -108,3 +111,17 @@ def test_height_control_passes_a_volume_fold():
 def test_bad_loads_are_named(arguments):
     with pytest.raises(fm.InputError):
         fm.equilibria(disc_scene(OGDEN, elements=4), **arguments)
+
+
+def test_a_rate_that_hardly_changes_sign_is_no_failure():
+    """Beside a contact a rate is flat around its zero, as (s - c)^9 is: what is found after bounded work is the answer, with its error."""
+    place = 0.3141592653589793
+    still = SimpleNamespace(correction=0.0)
+    flat = SimpleNamespace(
+        at=lambda s: SimpleNamespace(sigma=s, state=still, rate=lambda q: 1.0, value=lambda q: 0.0),
+        problem=SimpleNamespace(units={"pressure": 1.0}),
+        length=1.0,
+    )
+    share, located = Segment._root(flat, "limit_point", lambda point: (point.sigma - place) ** 9, 0.0, 1.0)
+    assert share == pytest.approx(place, abs=1e-3)
+    assert located.kind == "limit_point"

@@ -30,10 +30,13 @@ from .physics.loads import Load as Load
 from .physics.loads import Weight as Weight
 from .physics.magnetics import Dipole as Dipole
 from .physics.magnetics import Source as Source
+from .physics.magnets import Magnet as Magnet
 from .physics.materials import MooneyRivlin as MooneyRivlin
 from .physics.materials import NeoHookean as NeoHookean
 from .physics.materials import Ogden as Ogden
 from .physics.materials import Varga as Varga
+from .physics.mixture import iron_content as iron_content
+from .physics.mixture import maxwell_garnett as maxwell_garnett
 from .physics.scales import Scales as Scales
 from .physics.sources import Loop as Loop
 from .physics.sources import Solenoid as Solenoid

@@ -23,6 +23,7 @@ from ..physics.loads import Load, hub_density, lidded_volume_density, over_proje
 from ..physics.magnetics import Source, magnetic_energy_density
 from ..physics.tension_field import strain_energy
 from ..threads import Guard
+from .nearby import Nearby
 
 if TYPE_CHECKING:
     from ..physics.materials import Material
@@ -85,9 +86,11 @@ def point_expressions(
     volume = inside * enclosed
     magnetic = ca.SX(0)
     if sources and scene.susceptibility:
-        magnetic = area * magnetic_energy_density(sources, scene.susceptibility, R + u, Z + w)
+        near = Nearby(sources, R + u, Z + w)
+        magnetic = area * magnetic_energy_density(near.sources, scene.susceptibility, R + u, Z + w)
         magnetic = parameters[1] * magnetic
         second, first = ca.hessian(magnetic, local)
+        magnetic, first, second = near.placed(magnetic, first, second)
         gradient, hessian = gradient + first, hessian + second
     load = ca.SX(0)
     if loads:

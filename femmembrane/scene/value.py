@@ -21,7 +21,7 @@ from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
 from ..physics.along import Along
 from ..physics.loads import Load, on_hubs
-from ..physics.magnetics import Source, distance_to_polyline
+from ..physics.magnetics import Source
 from ..physics.materials import Material
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
@@ -176,15 +176,18 @@ class Scene:
                 factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
 
     def _check_sources(self) -> None:
-        R, Z = self.mesh.position(self.mesh.breakpoints())
+        ends = self.mesh.breakpoints()
+        R, Z = self.mesh.position(ends)
+        # elements may be curved
+        finer = self.mesh.position(np.interp(np.arange(4 * len(ends) - 3) / 4, np.arange(len(ends)), ends)) if self.sources else (R, Z)
         for k, source in enumerate(self.sources):
             path = item_path("source", k, len(self.sources))
             allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
-            _check_interface(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "sees", "refusal"), allowed)
-            # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles may lie between them
+            _check_interface(path, source, ("field", "jet", "intensity", "distance_squared", "passed", "meets", "sees", "refusal"), allowed)
+            # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles and bodies may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
-            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in source.circles)
+            touched = source.meets(*finer)
             if touched or not finite:
                 name, reason = source.refusal
                 if not touched and _too_far(source):

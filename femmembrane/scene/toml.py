@@ -94,6 +94,8 @@ _OTHERWISE = {
     (Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows",
     (Magnet, "strength"): "give it, or the remanence in T beside a table [scales]",
 }
+#: keys of a table from which an argument of its class follows
+_INSTEAD: dict[Any, tuple[str, ...]] = {Magnet: ("remanence",)}
 
 
 def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
@@ -240,7 +242,7 @@ def _table(name: str, value: Any) -> Mapping[str, Any]:
 def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
     """The object of a class from a table with its arguments. ``beside`` are further keys of the table, which are read elsewhere."""
     names = tuple(f.name for f in fields(cls))
-    _refuse_unknown(path, table, (*beside, *names))
+    _refuse_unknown(path, table, (*beside, *names, *_INSTEAD.get(cls, ())))
     for f in fields(cls):
         if f.name not in table and f.default is f.default_factory is dataclasses.MISSING:
             raise InputError(f"{path}.{f.name}", None, "missing; " + _OTHERWISE.get((cls, f.name), "it has no default"))

@@ -89,7 +89,13 @@ class Source:
         return found
 
     def singular_squared(self, rho: Any, eta: Any) -> Any:
-        """Squared distance from the nearest point where the field is singular: what a mesh must resolve."""
+        """Squared distance from the nearest point where the field is singular: what a mesh must resolve.
+
+        Parameters
+        ----------
+        rho, eta : ndarray
+            Radii and heights of points, over R0.
+        """
         return self.distance_squared(rho, eta)
 
     def meets(self, rho: Array, eta: Array) -> bool:

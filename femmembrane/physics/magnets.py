@@ -178,13 +178,13 @@ class Magnet(Source):
         return Jet(*(amplitude * part for part in parts))
 
     def distance_squared(self, rho: Any, eta: Any) -> Any:
-        """Squared distance from the body; 0 inside it."""
+        """See :meth:`.Source.distance_squared`: from the body, 0 inside it."""
         across = np.maximum(np.maximum(rho - self.radius, self.inner_radius - rho), 0.0)
         along = np.maximum(np.abs(eta - self.height) - self.length / 2, 0.0)
         return across**2 + along**2
 
     def singular_squared(self, rho: Any, eta: Any) -> Any:
-        """Squared distance from the edges."""
+        """See :meth:`.Source.singular_squared`: the edges."""
         return Source.distance_squared(self, rho, eta)
 
     def passed(self, before: float, after: float) -> bool:

@@ -5,8 +5,8 @@ radius of 12.5 mm: from 7e-5 to 0.5, where papers draw branches for 200 to 600. 
 beside the softer membrane it would have to be as large as a sphere of twice the membrane's radius.
 
 A magnet need not be strong if it comes near. It draws the unloaded membrane down, until at some distance the membrane snaps onto it. There
-the least pressure on the branch of equilibria is zero. The same is asked of a dipole of the same strength in the middle of the magnet. It is
-too strong nearby, since it has its whole moment in one point.
+the least pressure on the branch of equilibria is zero. A dipole of the same strength in the middle of the magnet is asked for the same. It
+is too strong nearby, since it has its whole moment in one point.
 
     python demos/magnet.py                table and picture in out/magnet, 10 seconds
 

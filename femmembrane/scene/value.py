@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..checks import number, sequence, store, switch, whole
-from ..discretization.lift import lift_of
+from ..discretization.lift import Lift, lift_of
 from ..discretization.meridian import Meridian, disc
 from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
@@ -146,8 +146,8 @@ class Scene:
         )
         self._check_size()
         self._check_sheet()
-        lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
-        self._check_sources()
+        lift = lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
+        self._check_sources(lift)
         self._check_hubs()
 
     def _check_size(self) -> None:
@@ -175,11 +175,12 @@ class Scene:
             if factor is not None:
                 factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
 
-    def _check_sources(self) -> None:
+    def _check_sources(self, lift: Lift | None) -> None:
         ends = self.mesh.breakpoints()
-        R, Z = self.mesh.position(ends)
-        # elements may be curved
-        finer = self.mesh.position(np.interp(np.arange(4 * len(ends) - 3) / 4, np.arange(len(ends)), ends)) if self.sources else (R, Z)
+        s = np.interp(np.arange(4 * len(ends) - 3) / 4, np.arange(len(ends)), ends) if self.sources else ends  # elements may be curved
+        R, Z = self.mesh.position(s)
+        if lift is not None:
+            R, Z = R + lift.at(self.mesh, s)[0], Z + lift.at(self.mesh, s)[2]
         for k, source in enumerate(self.sources):
             path = item_path("source", k, len(self.sources))
             allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
@@ -187,7 +188,7 @@ class Scene:
             # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles and bodies may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
-            touched = source.meets(*finer)
+            touched = source.meets(R, Z)
             if touched or not finite:
                 name, reason = source.refusal
                 if not touched and _too_far(source):

@@ -36,10 +36,13 @@ from .physics.loads import Load as Load
 from .physics.loads import Weight as Weight
 from .physics.magnetics import Dipole as Dipole
 from .physics.magnetics import Source as Source
+from .physics.magnets import Magnet as Magnet
 from .physics.materials import MooneyRivlin as MooneyRivlin
 from .physics.materials import NeoHookean as NeoHookean
 from .physics.materials import Ogden as Ogden
 from .physics.materials import Varga as Varga
+from .physics.mixture import iron_content as iron_content
+from .physics.mixture import maxwell_garnett as maxwell_garnett
 from .physics.named import MaterialData as MaterialData
 from .physics.named import material as material
 from .physics.named import material_data as material_data

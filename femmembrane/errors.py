@@ -52,7 +52,7 @@ _ADVICE = {
     Status.NOT_CONVERGED: "start nearer (smaller load steps, or start= an equilibrium close by)",
     Status.STEP_UNDERFLOW: "no step beyond this point converges; where the branch turns back, fm.trace follows it round",
     Status.NO_EQUILIBRIUM: "start from a neighbour (start= an equilibrium close by), or see with fm.trace which loads a branch passes",
-    Status.DIPOLE_CONTACT: "the membrane runs into a source, where the energy has no lower bound; lower the strength or the load",
+    Status.DIPOLE_CONTACT: "the membrane runs into a source, into its singular field or its body; lower the strength or the load",
     Status.NOT_A_MINIMUM: 'forces balance there, but a minimiser cannot hold it; solver="newton" accepts such states',
     Status.STEP_LIMIT: "raise max_steps, or continue from here (fm.trace with start= this branch)",
     Status.UNEXPLAINED_INERTIA: "a special point lies there that was not located; trace that stretch with smaller steps",

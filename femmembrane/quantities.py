@@ -21,6 +21,8 @@ SI_UNITS: Mapping[str, str] = {
     "stress": "Pa",
     "energy": "J",
     "dipole_strength": "A m^2",
+    "remanence": "T",
+    "magnetization": "A/m",
 }
 
 

@@ -63,8 +63,20 @@ class Source:
         h_rho, h_z, h_theta = self.field(rho, eta)
         return h_rho**2 + h_z**2 + h_theta**2
 
+    def jet(self, rho: Any, eta: Any) -> Any:
+        """The field with its first and second derivatives (:class:`.Jet`), for a source without h_theta that has them written out.
+
+        None, the default, leaves it to CasADi to differentiate :meth:`field`.
+
+        Parameters
+        ----------
+        rho, eta : float, ndarray or CasADi symbol
+            Radius and height of the point, over R0.
+        """
+        return None
+
     def distance_squared(self, rho: Any, eta: Any) -> Any:
-        """Squared distance from the nearest point where the field is singular; infinite where there is none.
+        """Squared distance from the nearest point that a membrane cannot pass, singular or of a body; infinite where there is none.
 
         Parameters
         ----------
@@ -75,6 +87,26 @@ class Source:
         for a, h in self.circles:
             found = np.minimum(found, (rho - a) ** 2 + (eta - h) ** 2)
         return found
+
+    def singular_squared(self, rho: Any, eta: Any) -> Any:
+        """Squared distance from the nearest point where the field is singular: what a mesh must resolve.
+
+        Parameters
+        ----------
+        rho, eta : ndarray
+            Radii and heights of points, over R0.
+        """
+        return self.distance_squared(rho, eta)
+
+    def meets(self, rho: Array, eta: Array) -> bool:
+        """Whether a meridian of straight pieces, shape (n,) each, meets the source.
+
+        Parameters
+        ----------
+        rho, eta : ndarray
+            Radii and heights of the ends of the pieces, over R0.
+        """
+        return any(distance_to_polyline(rho, eta, circle) < 1e-9 for circle in self.circles)
 
     def passed(self, before: float, after: float) -> bool:
         """Whether a point on the axis that moved between two heights went through the source.

@@ -9,6 +9,8 @@ quantity               unit                  SI
 ``stress``             mu                    Pa
 ``energy``             mu T R0^2             J
 ``dipole_strength``    see below             A m^2
+``remanence``          sqrt(mu mu0)          T
+``magnetization``      sqrt(mu/mu0)          A/m
 =====================  ====================  =========
 
 A dipole of the physical moment m has the strength M = mu0 D^2/(R0^6 mu) with D = m/(4 pi) (paper eq. 33). So M = (m/m_0)^2 with
@@ -30,6 +32,8 @@ from ..errors import InputError
 from ..quantities import SI_UNITS
 from .magnetics import Dipole
 
+#: quantities that scale with sqrt(mu) alone; asked for by scenes with magnets
+_MAGNETIC = ("remanence", "magnetization")
 #: relative difference up to which two numbers that say the same thing agree
 AGREEMENT = 1e-9
 
@@ -80,7 +84,7 @@ class Scales:
             if not (is_number(value) and as_float(value) > 0):  # of any size: what follows from them is what counts
                 raise InputError(f"scales.{name}", value, f"a finite number > 0 is allowed (in {unit[name]})")
             object.__setattr__(self, name, float(value))
-        for quantity in SI_UNITS.keys() - {"dipole_strength"}:
+        for quantity in SI_UNITS.keys() - {"dipole_strength", *_MAGNETIC}:
             self._unit(quantity)
         self._in_range("radius over thickness", self.radius_to_thickness)
         if self.dipole_moment is not None:
@@ -111,7 +115,7 @@ class Scales:
 
         Parameters
         ----------
-        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength"}
+        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength", "remanence", "magnetization"}
 
         Raises
         ------
@@ -132,7 +136,7 @@ class Scales:
 
         Parameters
         ----------
-        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength"}
+        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength", "remanence", "magnetization"}
         value : float or array_like
             In the units of the package; volumes and energies with the 2 pi.
 
@@ -161,7 +165,7 @@ class Scales:
 
         Parameters
         ----------
-        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength"}
+        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength", "remanence", "magnetization"}
         value : float or array_like
             In ``units(quantity)``; for a dipole strength, the moment.
 
@@ -199,6 +203,10 @@ class Scales:
             from scipy.constants import mu_0  # here, so that reading a scene without a moment need not wait for it
 
             unit = 4 * math.pi * R * R * R * math.sqrt(mu / mu_0)
+        elif quantity in _MAGNETIC:
+            from scipy.constants import mu_0
+
+            unit = math.sqrt(mu / mu_0) * (mu_0 if quantity == "remanence" else 1)
         else:
             unit = {"length": R, "volume": R * R * R, "pressure": mu * T / R, "stress": mu, "energy": mu * T * R * R}[quantity]
         return self._in_range(f"the unit of {quantity}", unit)

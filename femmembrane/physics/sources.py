@@ -1,4 +1,4 @@
-"""Magnetic sources other than a dipole: coaxial loops and solenoids, a straight wire on the axis, a uniform field.
+"""Currents and uniform fields: coaxial loops and solenoids, a straight wire on the axis. Magnets stand in :mod:`.magnets`.
 
 A loop or solenoid of strength M has the moment of a dipole of that strength, and so its far field. Let a be the radius in units of R0 and I
 the current. The moment I pi (a R0)^2 of a loop then gives M = mu0 (I a^2/(4 R0))^2/(R0^2 mu), and the field at its centre is 2 sqrt(M)/a^3.
@@ -75,7 +75,7 @@ class Loop(Source):
 
 @dataclass(frozen=True)
 class Solenoid(Source):
-    """Thin coaxial solenoid, or a cylindrical magnet magnetised along the axis: a sheet of current around a cylinder.
+    """Thin coaxial solenoid, a sheet of current around a cylinder. It is hollow; a magnet has a body (:class:`.Magnet`).
 
     The sheet is a stack of loops (Jackson 1999, section 5.5) at Gauss points. At a distance of the order of its length the field is exact
     to round-off. At the distance d from the wall its relative error is about exp(-2 loops d/b), with b the larger of d and half the length.
@@ -84,7 +84,7 @@ class Solenoid(Source):
     Parameters
     ----------
     strength : float
-        M >= 0: the strength of a dipole with the same moment. A magnet with magnetisation m_0 has the moment m_0 pi radius^2 length R0^3.
+        M >= 0: the strength of a dipole with the same moment.
     height : float
         Signed height of its middle, in units of R0.
     radius, length : float

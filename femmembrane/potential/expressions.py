@@ -25,6 +25,7 @@ from ..physics.magnetisation import Magnetisation
 from ..physics.tension_field import strain_energy
 from ..threads import Guard
 from .magnetic import point_energy
+from .nearby import Nearby
 
 if TYPE_CHECKING:
     from ..physics.materials import Material
@@ -86,17 +87,18 @@ def point_expressions(
     inside = weight if space.side > 0 else -weight
     volume = inside * enclosed
     magnetic = ca.SX(0)
-    magnetisation = Magnetisation.of(scene) if sources else None
-    if magnetisation is not None:
-        remanence = data[columns.index("remanence")] if "remanence" in columns else magnetisation.remanence
-        rates = (R_x if flat else np.sqrt(R_x**2 + Z_x**2)), R
-        found = point_energy(magnetisation, sources, (R + u, Z + w), (R_x + u_x, Z_x + w_x), rates, remanence, local)
-        magnetic, first, second = (area * parameters[1] * part for part in found)
-        gradient, hessian = gradient + first, hessian + second
-    elif sources:
-        magnetic = area * magnetic_energy_density(sources, scene.susceptibility or 0.0, R + u, Z + w)
-        magnetic = parameters[1] * magnetic
-        second, first = ca.hessian(magnetic, local)
+    if sources:
+        near = Nearby(sources, R + u, Z + w)
+        magnetisation = Magnetisation.of(scene)
+        if magnetisation is not None:
+            remanence = data[columns.index("remanence")] if "remanence" in columns else magnetisation.remanence
+            rates = (R_x if flat else np.sqrt(R_x**2 + Z_x**2)), R
+            found = point_energy(magnetisation, near.sources, (R + u, Z + w), (R_x + u_x, Z_x + w_x), rates, remanence, local)
+            magnetic, first, second = (area * parameters[1] * part for part in found)
+        else:
+            magnetic = parameters[1] * (area * magnetic_energy_density(near.sources, scene.susceptibility or 0.0, R + u, Z + w))
+            second, first = ca.hessian(magnetic, local)
+        magnetic, first, second = near.placed(magnetic, first, second)
         gradient, hessian = gradient + first, hessian + second
     load = ca.SX(0)
     if loads:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..physics.magnetics import Source, field_intensity, magnetic_field
 from ..physics.magnetisation import Law, Magnetisation, langevin
+from .nearby import Nearby
 
 
 @dataclass
@@ -147,7 +148,8 @@ def wave_function(magnetisation: Magnetisation, sources: Sequence[Source]) -> ca
     rho, eta, rho_S, eta_S, R, remanence = ca.vertsplit(state)
     x, height = rho + a, eta + b
     radius = np.sqrt(x**2 + c**2)
-    h_r, h_z, h_theta = magnetic_field(sources, radius, height)
+    near = Nearby(sources, radius, height)
+    h_r, h_z, h_theta = magnetic_field(near.sources, radius, height)
     h = ca.vertcat((h_r * x - h_theta * c) / radius, (h_r * c + h_theta * x) / radius, h_z)
     x1, x2 = ca.vertcat(rho_S + a_S, c_S, eta_S + b_S), ca.vertcat(e, rho / R + q, f)
     normal = ca.cross(x1, x2)
@@ -163,7 +165,7 @@ def wave_function(magnetisation: Magnetisation, sources: Sequence[Source]) -> ca
     )
     known = _Symbols()
     density = _density(magnetisation, parts, remanence, known)
-    second = known.replaced([ca.hessian(density, y)[0]])[0]
+    second = near.placed(*known.replaced([ca.hessian(density, y)[0]]))[0]
     first, last = range(N_EVEN), range(N_EVEN, N_EVEN + N_ODD)
     rows = [second[i, j] for kind in (first, last) for i in kind for j in kind if i <= j]
     at_zero = ca.substitute([ca.vertcat(*rows)], [y], [ca.SX.zeros(N_EVEN + N_ODD)])[0]

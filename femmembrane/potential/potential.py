@@ -27,6 +27,7 @@ from ..physics.tension_field import strain_energy
 from ..threads import cached_property
 from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .magnetic import wave_function
+from .nearby import Nearby
 from .replay import PointProgram, Replay, at_points
 
 if TYPE_CHECKING:
@@ -375,10 +376,11 @@ class Potential:
         y = ca.SX.sym("y", 2)
         with casadi_answers_numpy():
             density = over_reference(self.loads, y[0], y[1]) + ca.SX(0)
+            near, scene = Nearby(self.sources, y[0], y[1]), self.scene
             if self.sources and not self.tilts:
-                scene = self.scene
-                density += position_energy_density(self.sources, scene.susceptibility or 0.0, scene.saturation, y[0], y[1])
-        hessian, gradient = ca.hessian(density, y)
+                density += position_energy_density(near.sources, scene.susceptibility or 0.0, scene.saturation, y[0], y[1])
+            hessian, gradient = ca.hessian(density, y)
+            density, gradient, hessian = near.placed(density, gradient, hessian)
         return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
     @property

@@ -44,6 +44,7 @@ from ..physics.invariant import ArrudaBoyce, ExtendedTube, Fung, Gent, LopezPami
 from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
 from ..physics.loads import HubForce, Hydrostatic, Weight
 from ..physics.magnetics import Dipole
+from ..physics.magnets import Magnet
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
 from ..physics.named import material
 from ..physics.scales import Scales
@@ -74,6 +75,7 @@ MATERIALS: dict[str, Any] = {
 SOURCES: dict[str, Any] = {
     "dipole": Dipole,
     "loop": Loop,
+    "magnet": Magnet,
     "solenoid": Solenoid,
     "tabulated": Tabulated,
     "uniform": Uniform,
@@ -102,7 +104,12 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
 #: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
 MAX_BYTES = 2**25
 #: other sources of an argument without a default, for the message when it is missing
-_OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
+_OTHERWISE = {
+    (Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows",
+    (Magnet, "strength"): "give it, or the remanence in T beside a table [scales]",
+}
+#: keys of a table from which an argument of its class follows
+_INSTEAD: dict[Any, tuple[str, ...]] = {Magnet: ("remanence",)}
 
 
 def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
@@ -225,7 +232,7 @@ def _known_keys() -> dict[str, set[str]]:
 
     keys = {table: set(names) for table, names in SCENE_KEYS.items()}
     keys["material"] = {"model", "name"} | arguments(*MATERIALS.values())
-    keys["source"] = {"kind"} | arguments(*SOURCES.values())
+    keys["source"] = {"kind", "remanence"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
     keys["mesh"] |= {"shape", "file", *FILE_KEYS} | arguments(*SHAPES.values())
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
@@ -249,7 +256,7 @@ def _table(name: str, value: Any) -> Mapping[str, Any]:
 def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
     """The object of a class from a table with its arguments. ``beside`` are further keys of the table, which are read elsewhere."""
     names = tuple(f.name for f in fields(cls))
-    _refuse_unknown(path, table, (*beside, *names))
+    _refuse_unknown(path, table, (*beside, *names, *_INSTEAD.get(cls, ())))
     for f in fields(cls):
         if f.name not in table and f.default is f.default_factory is dataclasses.MISSING:
             raise InputError(f"{path}.{f.name}", None, "missing; " + _OTHERWISE.get((cls, f.name), "it has no default"))
@@ -299,10 +306,20 @@ def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Sca
         if table.get("kind") == "dipole" and scales is not None and scales.dipole_moment is not None:
             table = {"strength": scales.strength, **table}  # only in place of one that is left out
         try:
+            if table.get("kind") == "magnet" and "remanence" in table:
+                table = _with_strength(table, scales)
             items.append(_build_one_of(path, "kind", registry, table))
         except InputError as error:  # it does not know its place in the list
             raise InputError(re.sub(rf"^{name}(?=\.)", path, error.key), error.value, error.allowed) from None
     return tuple(items)
+
+
+def _with_strength(table: Mapping[str, Any], scales: Scales | None) -> dict[str, Any]:
+    """The table of a magnet with the strength that follows from its remanence."""
+    rest = {name: value for name, value in table.items() if name not in ("kind", "remanence")}
+    _build("source", Magnet, {"strength": 0.0} | rest)  # everything else is checked first
+    magnet = Magnet(**rest, remanence=table["remanence"], scales=scales)
+    return {"kind": "magnet", **rest, "strength": magnet.strength}
 
 
 def item_path(name: str, index: int, count: int) -> str:

@@ -14,14 +14,14 @@ from typing import Any, Self
 import numpy as np
 
 from ..checks import number, sequence, store, switch, whole
-from ..discretization.lift import lift_of
+from ..discretization.lift import Lift, lift_of
 from ..discretization.meridian import Meridian, disc
 from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
 from ..physics.along import Along
 from ..physics.loads import Load, on_hubs
-from ..physics.magnetics import Source, distance_to_polyline
+from ..physics.magnetics import Source
 from ..physics.materials import Material
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
@@ -167,8 +167,8 @@ class Scene:
             raise InputError("effects.tension_field", True, allowed)
         self._check_size()
         self._check_sheet()
-        lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
-        self._check_sources()
+        lift = lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
+        self._check_sources(lift)
         self._check_hubs()
 
     def _check_size(self) -> None:
@@ -196,16 +196,20 @@ class Scene:
             if factor is not None:
                 factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
 
-    def _check_sources(self) -> None:
-        R, Z = self.mesh.position(self.mesh.breakpoints())
+    def _check_sources(self, lift: Lift | None) -> None:
+        ends = self.mesh.breakpoints()
+        s = np.interp(np.arange(4 * len(ends) - 3) / 4, np.arange(len(ends)), ends) if self.sources else ends  # elements may be curved
+        R, Z = self.mesh.position(s)
+        if lift is not None:
+            R, Z = R + lift.at(self.mesh, s)[0], Z + lift.at(self.mesh, s)[2]
         for k, source in enumerate(self.sources):
             path = item_path("source", k, len(self.sources))
             allowed = "a source is allowed, such as Dipole(strength=..., height=...), or an object of a class derived from Source"
-            _check_interface(path, source, ("field", "intensity", "distance_squared", "passed", "circles", "sees", "refusal"), allowed)
-            # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles may lie between them
+            _check_interface(path, source, ("field", "jet", "intensity", "distance_squared", "passed", "meets", "sees", "refusal"), allowed)
+            # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles and bodies may lie between them
             with np.errstate(all="ignore"):
                 finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
-            touched = any(distance_to_polyline(R, Z, circle) < 1e-9 for circle in source.circles)
+            touched = source.meets(R, Z)
             if touched or not finite:
                 name, reason = source.refusal
                 if not touched and _too_far(source):

@@ -204,6 +204,11 @@ class _Scaled:
         amplitude = np.sqrt(self.factor + _TINY)
         return tuple(amplitude * component for component in self.source.field(rho, eta))
 
+    def jet(self, rho: Any, eta: Any) -> Any:
+        jet = self.source.jet(rho, eta)
+        amplitude = np.sqrt(self.factor + _TINY)
+        return None if jet is None else type(jet)(*(amplitude * part for part in jet))
+
     def intensity(self, rho: Any, eta: Any) -> Any:
         return self.factor * self.source.intensity(rho, eta)
 

@@ -192,14 +192,14 @@ def unresolved_source(potential: Potential, x: Array) -> str:
 
 
 def poles_by_sources(potential: Potential, x: Array) -> list[tuple[float, float]]:
-    """For each pole its distance from the nearest source and the length of the element there, deformed; nothing without sources."""
+    """For each pole its distance from the nearest singular point and the length of the element there, deformed; nothing without sources."""
     if not potential.sources:
         return []
     space, found = potential.space, []
     for k in (0, -1):
         if space.on_axis[k]:
             (_, pole), (rho, eta) = space.end_position(x, k), space.end_position(x, 1 if k == 0 else -2)
-            near = math.sqrt(min(float(source.distance_squared(0.0, pole)) for source in potential.sources))
+            near = math.sqrt(min(float(source.singular_squared(0.0, pole)) for source in potential.sources))
             found.append((near, math.hypot(rho, eta - pole)))
     return found
 

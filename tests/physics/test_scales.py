@@ -41,6 +41,8 @@ LINEAR = sorted(SI_UNITS.keys() - {"dipole_strength"})
         ("pressure", 400.0, "Pa"),
         ("stress", 4e5, "Pa"),
         ("energy", 0.05, "J"),
+        ("remanence", math.sqrt(mu_0 * 4e5), "T"),
+        ("magnetization", math.sqrt(4e5 / mu_0), "A/m"),
     ],
 )
 def test_units_by_hand(quantity, si, unit):

@@ -1,9 +1,9 @@
 """The public names: where each is defined. This list is the only one; ``__init__.py`` reads it."""
 
+from .discretization.curve import Curve as Curve
+from .discretization.curve import meridian_from_points as meridian_from_points
 from .discretization.meridian import Disc as Disc
 from .discretization.meridian import disc as disc
-from .discretization.mesh_files import Curve as Curve
-from .discretization.mesh_files import meridian_from_points as meridian_from_points
 from .discretization.mesh_files import read_meridian as read_meridian
 from .discretization.mesh_files import write_meridian as write_meridian
 from .discretization.shapes import Annulus as Annulus

@@ -40,7 +40,8 @@ def write(folder: Path, out: Path | None = None) -> Path:
 
     inside = folder if folder.is_dir() else folder.parent
     facts = (read_record(folder) or {}) if folder.is_dir() else {}
-    branch = _without_equilibria(facts) if facts.get("equilibria") == 0 else finished(folder)
+    alone = facts.get("equilibria") == 0 and not (folder / "branch.nc").exists()
+    branch = _without_equilibria(facts) if alone else finished(folder, facts)
     page = inside / "report.html" if out is None else out
     remove_leftovers(page.parent)
     write_report(branch, page, facts)

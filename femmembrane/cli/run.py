@@ -92,7 +92,7 @@ def _ended(scene: Scene, out: Path) -> int | None:
     if facts["status"] == Status.INTERRUPTED:
         return None
     if facts["equilibria"]:
-        finished(out)  # damaged results are refused here, and not reported as done
+        finished(out, facts)  # results that are damaged, or of another run, are refused here, and not reported as done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)

@@ -27,7 +27,7 @@ density B has M = (B/B_0)^2 with B_0 = sqrt(mu mu0).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, overload
 
@@ -36,24 +36,10 @@ from numpy.typing import NDArray
 
 from ..checks import as_float, choice, is_number
 from ..errors import InputError
+from ..quantities import SI_UNITS
 from .magnetics import Dipole
 from .units import has_unit, in_unit
 
-#: SI unit of every quantity
-UNITS: Mapping[str, str] = {
-    "length": "m",
-    "volume": "m^3",
-    "pressure": "Pa",
-    "stress": "Pa",
-    "energy": "J",
-    "force": "N",
-    "field": "A/m",
-    "weight": "kg/m^3",
-    "gamma": "kg/m^3",
-    "dipole_strength": "A m^2",
-    "wire_strength": "A",
-    "uniform_strength": "T",
-}
 #: strengths are squares of what is measured
 SQUARED = ("dipole_strength", "wire_strength", "uniform_strength")
 #: kinds whose units must be numbers in every scene; others when they are asked for
@@ -148,7 +134,7 @@ class Scales:
             For an unknown quantity.
         """
         _check_quantity(quantity)
-        return UNITS[quantity]
+        return SI_UNITS[quantity]
 
     @overload
     def to_si(self, quantity: str, value: float) -> float: ...
@@ -209,7 +195,7 @@ class Scales:
         """
         if has_unit(value):
             _check_quantity(quantity)
-            value = in_unit("value", value, UNITS[quantity])[0]
+            value = in_unit("value", value, SI_UNITS[quantity])[0]
         given = _values(quantity, value)
         with np.errstate(over="ignore"):
             ratio = given / self._unit(quantity)
@@ -253,7 +239,7 @@ class Scales:
 
 
 def _check_quantity(quantity: Any) -> None:
-    choice("quantity", quantity, UNITS)
+    choice("quantity", quantity, SI_UNITS)
 
 
 def _values(quantity: str, value: Any) -> Array:

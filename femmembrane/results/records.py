@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status, printable
+from ..quantities import PLACES, words, written
 from ..scene import WRINKLING
 from ..solve.controls import control_kind
 from ..threads import one_thread
@@ -462,10 +463,11 @@ class Branch(Sequence[Equilibrium]):
         from .analyses import printed
 
         columns = printed(self.scene)
-        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {c.heading:<{c.width}}" for c in columns)
+        head = " ".join([f"{'step':>4}", *(f"{words(name):>12}" for name in PLACES)])
+        head += "".join(f"  {c.heading:<{c.width}}" for c in columns)
         lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
-            numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
+            numbers = " ".join([f"{k:>4}", *(written(name, getattr(eq, name), 12) for name in PLACES)])
             lines.append(numbers + "".join(f"  {c.text(eq):<{c.width}}" for c in columns))
         lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)

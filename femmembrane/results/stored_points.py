@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Status
+from ..quantities import typed
 from .analyses.base import Variable
-from .quantities import typed
 from .records import Equilibrium, Jump, PathMemory, SpecialPoint, TraceMemory
 
 if TYPE_CHECKING:

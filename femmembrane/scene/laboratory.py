@@ -17,8 +17,9 @@ from typing import Any
 
 from ..checks import choice, is_number
 from ..errors import InputError, unknown_name
-from ..physics.scales import AGREEMENT, UNITS, Scales
+from ..physics.scales import AGREEMENT, Scales
 from ..physics.units import has_unit, in_unit
+from ..quantities import SI_UNITS
 from .moduli import without_moduli
 from .toml import item_path
 
@@ -150,7 +151,7 @@ class _Laboratory:
         if isinstance(value, (list, tuple)):
             return [self._number(f"{key}[{k}]", one, kind) for k, one in enumerate(value)]
         if kind and has_unit(value):
-            return self._over_unit(key, in_unit(key, value, UNITS[kind])[0], kind)
+            return self._over_unit(key, in_unit(key, value, SI_UNITS[kind])[0], kind)
         return self._over_unit(key, value, kind) if kind and self.si and is_number(value) else value
 
     def _over_unit(self, key: str, value: float, kind: str) -> float:

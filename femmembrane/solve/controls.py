@@ -18,6 +18,7 @@ import numpy as np
 from ..checks import choice, convert
 from ..discretization.space import Space
 from ..potential import Array, Evaluation
+from ..quantities import heading
 from ..scene.run import MINIMISED, PRESCRIBED
 
 
@@ -238,8 +239,6 @@ class ControlKind:
     ----------
     name : str
         Public name: argument of the verbs, attribute of an equilibrium, column of a branch, key of :attr:`.Space.units`.
-    symbol : str
-        How messages and tables write it.
     at : callable
         The control that holds it at a load.
     value : callable
@@ -251,11 +250,15 @@ class ControlKind:
     """
 
     name: str
-    symbol: str
     at: Callable[[float], Control]
     value: Callable[[Space, Array, float, float], float]
     rate: Callable[[Space, float, Evaluation, Array, float], float]
     rest: Callable[[Space], float]
+
+    @property
+    def symbol(self) -> str:
+        """How messages and tables write it."""
+        return heading(self.name)
 
     @property
     def words(self) -> str:
@@ -287,7 +290,6 @@ CONTROLS: Mapping[str, ControlKind] = {
     for kind in (
         ControlKind(
             "volume",
-            "V",
             VolumeControl,
             value=lambda space, x, pressure, volume: volume,
             rate=lambda space, pressure, evaluation, dx, dp: float(evaluation.volume_gradient @ dx),
@@ -295,7 +297,6 @@ CONTROLS: Mapping[str, ControlKind] = {
         ),
         ControlKind(
             "pressure",
-            "P",
             PressureControl,
             value=lambda space, x, pressure, volume: pressure,
             rate=lambda space, pressure, evaluation, dx, dp: dp,
@@ -303,7 +304,6 @@ CONTROLS: Mapping[str, ControlKind] = {
         ),
         ControlKind(
             "center_height",
-            "pole height",
             CenterHeightControl,
             value=lambda space, x, pressure, volume: space.center_height(x),
             rate=_pole_rate,

@@ -10,8 +10,9 @@ from typing import Self, TypeAlias
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
+from ..quantities import PLACES
 from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
-from ..scene import QUANTITIES, Scene
+from ..scene import Scene
 from ..solve import state_resolution, wellposed
 from ..solve.branch import FOLDS, BranchProblem, first_point, oriented_point
 from ..solve.contact import stopped_by_source, touches_source
@@ -129,7 +130,7 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
         raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
     targets = dict(until or {})
     for quantity, value in targets.items():
-        choice("until", quantity, QUANTITIES)
+        choice("until", quantity, PLACES)
         targets[quantity] = number(f"until.{quantity}", value)
     return targets
 

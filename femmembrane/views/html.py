@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..quantities import PLACES, title
 from ..results.analyses import column_heading, remarks
 
 if TYPE_CHECKING:
@@ -58,15 +59,10 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
     """The numbers of an equilibrium, with the verdicts that its scene asks for."""
-    energies = [("elastic energy", equilibrium.elastic_energy)]
-    energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []
+    scene = equilibrium.scene
+    energies = ["elastic_energy", *(["magnetic_energy"] if scene.sources else []), *(["load_energy"] if scene.loads else [])]
     return [
-        ("volume V", equilibrium.volume),
-        ("pressure P", equilibrium.pressure),
-        ("pole height", equilibrium.center_height),
-        *energies,
-        ("residual", equilibrium.residual),
-        ("status", equilibrium.status),
+        *((title(name), getattr(equilibrium, name)) for name in (*PLACES, *energies, "residual", "status")),
         *((remark.subject, remark.text) for remark in remarks(equilibrium)),
     ]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..files import replace_file
-from ..results.quantities import QUANTITIES
+from ..quantities import quantity
 from ..results.zones import KINDS
 from .backend import load
 from .surroundings import Box, surroundings
@@ -217,7 +217,7 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
         title = f"wrinkles by {criterion} stress"
     else:
         table = pyvista.LookupTable(_MAP, scalar_range=limits)
-        shown = QUANTITIES[surface.quantity]
+        shown = quantity(surface.quantity)
         title = shown.meaning if shown.unit == "1" else f"{shown.meaning} in {shown.unit}"
     mapper = pyvista.DataSetMapper()
     mapper.lookup_table, mapper.scalar_range = table, table.scalar_range

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from femmembrane.errors import InputError
@@ -52,6 +52,7 @@ def test_factors_by_hand(text, unit, value):
     assert in_unit("key", text, unit) == (value, unit)
 
 
+@settings(deadline=None)
 @given(st.integers(-(10**6), 10**6), st.sampled_from(["m", "k", "u", "M", "c"]))
 def test_prefixes_are_powers_of_ten(number, prefix):
     power = {"m": -3, "k": 3, "u": -6, "M": 6, "c": -2}[prefix]

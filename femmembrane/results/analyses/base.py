@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantities import Quantity
+from ...quantities import Quantity
 
 if TYPE_CHECKING:
     import xarray

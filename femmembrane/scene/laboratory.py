@@ -11,7 +11,7 @@ magnet (T or A/m), a uniform field (T or A/m). Numbers that are ratios, such as 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -256,19 +256,26 @@ def _scales(table: Any) -> Scales:
     return Scales(**given)
 
 
-def value_of(data: Mapping[str, Any], key: str, value: Any) -> Any:
-    """A value for a key of a scene file, such as ``source.0.height``, in the units of the package; it is meant as in the file itself.
+def values_in_file(data: Mapping[str, Any], key: str, values: Sequence[Any]) -> tuple[Any, ...]:
+    """Values for a key of a scene file, such as ``source.0.height``, in the units of the package; they are meant as in the file itself.
 
     Parameters
     ----------
     data : mapping
         The tables of the file, in any units.
     key : str
-    value : object
+    values : sequence
     """
     from .keys import set_key
 
-    place: Any = scaled(set_key(data, key, value))
+    if data.get("units") != "si" or key.partition(".")[0] == "material":  # whose numbers are over its shear modulus
+        return tuple(values)
+    found = [_at(scaled(set_key(data, key, value)), key) for value in values]
+    return tuple(value if one is None else one for value, one in zip(values, found, strict=True))
+
+
+def _at(tables: Any, key: str) -> Any:
+    """What stands at a key; None where nothing does."""
     for name in key.split("."):
-        place = place[int(name)] if isinstance(place, list) else place.get(name)
-    return place
+        tables = tables[int(name)] if isinstance(tables, list) else tables.get(name) if isinstance(tables, Mapping) else None
+    return tables

@@ -48,11 +48,12 @@ def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium], units: Units = S
     for rho, eta in ((length * rho, length * eta) for _, rho, eta in clamped_ends(shown[0])):
         axes.axhline(eta, color="0.8", linewidth=0.8, zorder=0)
         axes.plot([-rho, rho], [eta, eta], "s", color="black", markersize=5, zorder=5)
-    _draw_sources(axes, shown, length)
+    _draw_sources(axes, shown, units)
 
 
-def _draw_sources(axes: Axes, shown: Sequence[Equilibrium], length: float) -> None:
+def _draw_sources(axes: Axes, shown: Sequence[Equilibrium], units: Units) -> None:
     """Bodies of sources, with an arrow along the moment; one that is not drawn is named."""
+    length = units.factor("eta")
     box = Box.of([e.profile() for e in shown])
     around = surroundings(shown[0].scene, box)
     for body in around.near:
@@ -65,6 +66,13 @@ def _draw_sources(axes: Axes, shown: Sequence[Equilibrium], length: float) -> No
             axes.update_datalim([(0, tail), (0, tip)])
         look: dict[str, Any] = {"color": RED, "linewidth": 2.5, **({"marker": "o", "markersize": 6} if rho.size == 1 else {})}
         for side in (1, -1) if rho.any() else (1,):
-            axes.plot(side * rho, z, label=body.label if side > 0 else None, **look)
+            axes.plot(side * rho, z, label=_named(body.label, units) if side > 0 else None, **look)
     for name in around.absent:
-        axes.plot([], [], " ", label=f"({name})")
+        axes.plot([], [], " ", label=f"({_named(name, units)})")
+
+
+def _named(label: str, units: Units) -> str:
+    """The label of a source; a height at its end is given in the units of the picture."""
+    what, at, height = label.rpartition(" at height ")
+    unit = units.unit("eta")
+    return f"{what}{at}{units.factor('eta') * float(height):.4g} {unit}" if at and unit else label

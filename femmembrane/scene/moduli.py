@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from ..checks import is_number
 from ..errors import InputError
 from ..physics.units import has_unit, in_unit
-from .toml import MATERIALS, build_one_of
+from .toml import MATERIALS, material_of
 
 if TYPE_CHECKING:
     from ..physics.materials import Material
@@ -64,7 +64,7 @@ def measured(model: str, **numbers: Any) -> tuple[Material, float]:
     4950.0
     """
     table, shear_modulus = without_moduli({"model": model, **numbers}, None, True)
-    material: Material = build_one_of("material", "model", MATERIALS, table)
+    material: Material = material_of(table)
     if shear_modulus is None:
         raise InputError("material.mu", None, "missing; the shear modulus in Pa is allowed")
     return material, shear_modulus

@@ -156,7 +156,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         _refuse_unknown(table, tables[table], SCENE_KEYS[table])
     scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
     return dict(
-        material=build_one_of("material", "model", MATERIALS, tables["material"]),
+        material=material_of(tables["material"]),
         sources=_build_list("source", SOURCES, data.get("source", ()), scales),
         loads=_build_list("load", LOADS, data.get("load", ())),
         mesh=_build_mesh(tables["mesh"], folder),
@@ -244,7 +244,7 @@ def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...
     return cls(**{name: table[name] for name in names if name in table})
 
 
-def build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
+def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
     """The object of the class that a table names by its key ``selector``."""
     if selector not in table:
         raise InputError(f"{path}.{selector}", None, "missing; known: " + ", ".join(sorted(registry)))
@@ -252,9 +252,14 @@ def build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: M
     return _build(path, registry[table[selector]], table, (selector, *beside))
 
 
+def material_of(table: Mapping[str, Any]) -> Any:
+    """The material that a table [material] describes."""
+    return _build_one_of("material", "model", MATERIALS, table)
+
+
 def _build_mesh(table: Mapping[str, Any], folder: Path) -> Meridian:
     if "file" not in table:
-        mesh: Meridian = build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, beside=SCENE_KEYS["mesh"])
+        mesh: Meridian = _build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, beside=SCENE_KEYS["mesh"])
         return mesh
     _refuse_unknown("mesh", table, ("file", "unit", *FILE_KEYS, *SCENE_KEYS["mesh"]))
     if not isinstance(table["file"], str):
@@ -278,7 +283,7 @@ def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Sca
         if table.get("kind") == "dipole" and scales is not None and scales.dipole_moment is not None:
             table = {"strength": scales.strength, **table}  # only in place of one that is left out
         try:
-            items.append(build_one_of(path, "kind", registry, table))
+            items.append(_build_one_of(path, "kind", registry, table))
         except InputError as error:  # it does not know its place in the list
             raise InputError(re.sub(rf"^{name}(?=\.)", path, error.key), error.value, error.allowed) from None
     return tuple(items)

@@ -165,7 +165,7 @@ def write_caption(plotter: pyvista.Plotter, text: str) -> None:
     plotter.add_text(text, position=(0.03 * width, 0.9 * height), font_size=11 * height / 720, color="black", name="caption", render=False)
 
 
-def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units) -> str:
+def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units = SCALED) -> str:
     height = f"{words('center_height')} {units.factor('center_height') * equilibrium.center_height:.4g} {units.unit('center_height')}"
     numbers = f"{caption(equilibrium.volume, equilibrium.pressure, '   ', units)}   {height.rstrip()}"
     answers = [remark.caption for remark in remarks(equilibrium) if remark.caption]

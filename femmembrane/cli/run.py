@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
-from ..quantities import Units
 from .folders import Changes, System, finished, read, units_of, working
 from .interrupts import Interrupts
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
@@ -48,12 +47,13 @@ def run(
         Of pictures and the report: those of the package, or SI units by the [scales] of the scene; those of the scene file unless given.
     """
     asked = read(scene, changes)
-    system = units_of(scene, changes, units)
-    Units.of(system, asked.scales)
+    from ..quantities import Units
     from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
     from ..results.output import SURFACES_FOLDER, run_files
     from ..scene.absurd_loads import remarks_on_loads
 
+    system = units_of(scene, changes, units)
+    Units.of(system, asked.scales)
     for remark in remarks_on_loads(asked):
         fail(DONE, remark)
 

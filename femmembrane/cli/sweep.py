@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..quantities import Units
 from .folders import Changes, System, read, tables_of, units_of, working
 from .interrupts import Interrupts
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, refused, say
@@ -69,6 +68,7 @@ def sweep(
         Of the map: those of the package, or SI units by the [scales] of the scene; those of the scene file unless given. Values of --over,
         --pressure and --volume are meant as in the scene file.
     """
+    from ..quantities import Units
     from ..scene.keys import values_of
     from ..scene.laboratory import values_in_file
     from ..verbs.sweep import plan_sweep

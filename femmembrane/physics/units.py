@@ -71,6 +71,10 @@ EXAMPLES: Mapping[str, str] = {
     "A": 'a current such as "10 A"',
     "T": 'a flux density such as "50 mT"',
     "A/m": 'a magnetic field such as "10 kA/m"',
+    "V": 'a voltage such as "3 kV"',
+    "C": 'a charge such as "2 nC"',
+    "C/m^2": 'a charge per area such as "20 uC/m^2"',
+    "V/m": 'an electric field such as "40 MV/m"',
 }
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*(?![eE][+-]?[0-9])([^\W\d_].*?)\s*", re.DOTALL)
 _PART = re.compile(r"([^\W\d_]+(?:2O)?)(?:\^?(-?[1-9]))?")

@@ -19,28 +19,29 @@ from ..checks import choice, is_number
 from ..errors import InputError, unknown_name
 from ..physics.scales import AGREEMENT, Scales
 from ..physics.units import has_unit, in_unit
-from ..quantities import SI_UNITS
+from ..quantities import SI_UNITS, SYSTEMS, quantity
 from .moduli import without_moduli
+from .run import PRESCRIBED
 from .toml import item_path
 
-#: values of the key ``units``
-SYSTEMS = ("scaled", "si")
-#: kinds of the numbers of a scene file, by table and key
+#: kinds of the numbers of a scene file, by table and key; a unit in place of a kind is that of a number which a scene keeps in SI units
 _KINDS: Mapping[str, Mapping[str, str]] = {
     "source": {
         "height": "length",
         "radius": "length",
         "length": "length",
+        "inner_radius": "length",
+        "remanence": "T",
         "rho": "length",
         "z": "length",
         "h_rho": "field",
         "h_z": "field",
     },
     "load": {"weight": "weight", "gamma": "gamma", "force": "force"},
+    "chamber": {"volume": "volume", "atmosphere": "pressure"},
+    "electric": {"voltage": "V", "total_charge": "C", "frozen_charge": "C/m^2", "breakdown": "V/m", "from": "length", "to": "length"},
     "mesh": {"radii": "length", "points": "length", "inner_radius": "length", "height": "length", "length": "length", "radius": "length"},
 }
-#: kinds of the loads of a run, by the word of its control or the quantity
-_LOADS = {"volume": "volume", "pressure": "pressure", "height": "length", "center_height": "length"}
 #: keys of [mesh] that say how an end is held, and where
 _ENDS = ("inner", "outer", "rim", "top", "bottom", "first", "last")
 #: what may stand for the strength of a source, the one without a unit first
@@ -48,6 +49,7 @@ _STRENGTHS: Mapping[str, tuple[str, ...]] = {
     "dipole": ("A m^2",),
     "loop": ("A m^2", "A"),
     "solenoid": ("A m^2", "A", "T", "A/m"),
+    "magnet": ("A m^2", "T", "A/m"),
     "wire": ("A",),
     "uniform": ("T", "A/m"),
 }
@@ -121,18 +123,30 @@ class _Laboratory:
     tables: dict[str, Any]
     si: bool
 
-    def __post_init__(self) -> None:
-        self.scales = _scales(self.tables.get("scales"))
+    def _scales(self, key: str, value: Any) -> Scales:
+        """The scales, which a number needs."""
+        table = self.tables.get("scales", {})
+        if not isinstance(table, Mapping):
+            raise InputError("scales", table, "a table is allowed: [scales] with its keys below")
+        names = [f.name for f in fields(Scales)]
+        for name in table.keys() - set(names):
+            raise InputError(f"scales.{name}", table[name], unknown_name(f"scales.{name}", name, names).allowed)
+        missing = [name for name in ("radius", "thickness", "shear_modulus") if name not in table]
+        if missing:
+            more = "; the shear modulus follows where [material] has its moduli in Pa" if missing[-1] == "shear_modulus" else ""
+            raise InputError(key, value, f"a number in SI units needs [scales], where {', '.join(missing)} is missing{more}")
+        return Scales(**table)
 
     def scaled(self) -> dict[str, Any]:
         changed = dict(self.tables)
-        for name in ("source", "load"):
-            if isinstance(changed.get(name), (list, tuple)):
-                count = len(changed[name])
-                changed[name] = [self._item(name, item_path(name, k, count), table) for k, table in enumerate(changed[name])]
-        for name, convert in (("mesh", self._mesh), ("run", self._run), ("membrane", self._membrane)):
-            if isinstance(changed.get(name), Mapping):
-                changed[name] = convert(changed[name])
+        special = {"mesh": self._mesh, "run": self._run, "membrane": self._membrane}
+        for name in {**_KINDS, **special}:
+            table = changed.get(name)
+            if isinstance(table, (list, tuple)):
+                paths = (item_path(name, k, len(table)) for k in range(len(table)))
+                changed[name] = [self._item(name, path, item) for path, item in zip(paths, table, strict=True)]
+            elif isinstance(table, Mapping):
+                changed[name] = special[name](table) if name in special else self._table(name, table, _KINDS[name])
         return changed
 
     def value(self, path: str, key: str, value: Any) -> Any:
@@ -140,7 +154,7 @@ class _Laboratory:
         table, _, rest = key.partition(".")
         place, _, name = rest.rpartition(".")
         if table not in _KINDS:
-            return self._number(path, value, _LOADS.get(key, ""))
+            return self._number(path, value, "energy" if key == "gas" else quantity(PRESCRIBED.get(key, key)).si)
         items = self.tables.get(table)
         if name == "strength" and isinstance(items, (list, tuple)) and place.isdigit() and int(place) < len(items):
             return self._item(table, path.rpartition(".")[0], {**items[int(place)], "strength": value}, path)["strength"]
@@ -150,15 +164,18 @@ class _Laboratory:
         """A number, or lists of them, in the units of the package; what has no kind as it is."""
         if isinstance(value, (list, tuple)):
             return [self._number(f"{key}[{k}]", one, kind) for k, one in enumerate(value)]
-        if kind and has_unit(value):
-            return self._over_unit(key, in_unit(key, value, SI_UNITS[kind])[0], kind)
-        return self._over_unit(key, value, kind) if kind and self.si and is_number(value) else value
+        measured = in_unit(key, value, SI_UNITS.get(kind, kind))[0] if kind and has_unit(value) else None
+        if kind not in SI_UNITS:
+            return value if measured is None else measured
+        if measured is None and not (self.si and is_number(value)):
+            return value
+        return self._over_unit(key, value if measured is None else measured, kind)
 
     def _over_unit(self, key: str, value: float, kind: str) -> float:
         try:
-            return self.scales.from_si(kind, value)
+            return self._scales(key, value).from_si(kind, value)
         except InputError as error:
-            raise InputError(key, value, error.allowed) from None
+            raise InputError(key, value, error.allowed) if error.key == "value" else error from None
 
     def _table(self, path: str, table: Mapping[str, Any], kinds: Mapping[str, str]) -> dict[str, Any]:
         return {name: self._number(f"{path}.{name}", value, kinds.get(name, "")) for name, value in table.items()}
@@ -188,11 +205,12 @@ class _Laboratory:
         if kind == "uniform":
             return self._over_unit(key, found if unit == "T" else found * mu_0, "uniform_strength")
         if unit != "A m^2":  # moment = current times area, or magnetisation times volume
-            sizes: list[Any] = [source.get(name) for name in ("radius", "length")[: 1 if unit == "A" else 2]]
-            if not all(map(is_number, sizes)):
+            radius, inner, length = (source.get(name, 0.0) for name in ("radius", "inner_radius", "length"))
+            if not all(map(is_number, (radius, inner, length))):
                 return value  # the source refuses its size
-            R0 = self.scales.radius
-            found *= math.pi * (sizes[0] * R0) ** 2 * (1.0 if unit == "A" else sizes[1] * R0) / (mu_0 if unit == "T" else 1.0)
+            R0 = self._scales(key, value).radius
+            area = math.pi * (radius**2 - inner**2) * R0**2
+            found *= area * (1.0 if unit == "A" else length * R0) / (mu_0 if unit == "T" else 1.0)
         return self._over_unit(key, found, "dipole_strength")
 
     def _mesh(self, table: Mapping[str, Any]) -> dict[str, Any]:
@@ -220,12 +238,23 @@ class _Laboratory:
 
     def _membrane(self, table: Mapping[str, Any]) -> dict[str, Any]:
         changed = dict(table)
-        for name, unit, scale in (("thickness", "m", self.scales.thickness), ("modulus", "Pa", self.scales.shear_modulus)):
+        for name in ("remanence", "saturation"):  # in T, or A/m
+            if name in table:
+                changed[name] = self._magnetization(f"membrane.{name}", table[name])
+        for name, unit, scale in (("thickness", "m", "thickness"), ("modulus", "Pa", "shear_modulus")):
             if name in table:
                 changed[name] = self._factor(f"membrane.{name}", table[name], unit, scale)
         return changed
 
-    def _factor(self, key: str, value: Any, unit: str, scale: float) -> Any:
+    def _magnetization(self, key: str, value: Any) -> Any:
+        if not (has_unit(value) or (self.si and is_number(value))):
+            return value
+        from scipy.constants import mu_0
+
+        found, unit = in_unit(key, value, "T", "A/m") if isinstance(value, str) else (float(value), "T")
+        return self._over_unit(key, found / mu_0 if unit == "T" else found, "field")
+
+    def _factor(self, key: str, value: Any, unit: str, scale: str) -> Any:
         """A factor along the meridian: one with a unit is divided by that of the scales, and places are lengths."""
         if isinstance(value, (list, tuple)):
             pairs = [pair if isinstance(pair, (list, tuple)) else [pair] for pair in value]
@@ -235,25 +264,10 @@ class _Laboratory:
                 else pair
                 for k, pair in enumerate(pairs)
             ]
-        return in_unit(key, value, unit)[0] / scale if has_unit(value) else value
-
-
-def _scales(table: Any) -> Scales:
-    """The scales that numbers with a unit need."""
-    names = [f.name for f in fields(Scales)]
-    given = {} if table is None else table
-    if not isinstance(given, Mapping):
-        raise InputError("scales", table, "a table is allowed: [scales] with its keys below")
-    for name, value in given.items():
-        if name not in names:
-            raise InputError(f"scales.{name}", value, unknown_name(f"scales.{name}", name, names).allowed)
-    for name in ("radius", "thickness", "shear_modulus"):
-        if name not in given:
-            more = "; or give the moduli of [material] in Pa" if name == "shear_modulus" else ""
-            raise InputError(
-                f"scales.{name}", None, f"missing; numbers in SI units need [scales] with radius, thickness and shear_modulus{more}"
-            )
-    return Scales(**given)
+        if not has_unit(value):
+            return value
+        measured, _ = in_unit(key, value, unit)
+        return measured / float(getattr(self._scales(key, value), scale))
 
 
 def values_in_file(data: Mapping[str, Any], key: str, values: Sequence[Any]) -> tuple[Any, ...]:

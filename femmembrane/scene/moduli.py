@@ -8,6 +8,7 @@ model             moduli in Pa                                                  
 ================  ===============================================================  =========================
 mooney-rivlin     ``c10``, ``c01`` of W = c10 (I1 - 3) + c01 (I2 - 3)              2 (c10 + c01)
 yeoh              ``c1`` (or ``mu``), ``c2``, ``c3`` of W = sum of c_k (I1 - 3)^k  2 c1
+polynomial        ``c10``, ``c01``, ``c20``, ... of (I1 - 3)^i (I2 - 3)^j          2 (c10 + c01)
 ogden             ``mu``, one for each exponent                                    sum of mu_k alpha_k/2
 any other         ``mu``                                                           mu
 ================  ===============================================================  =========================
@@ -28,7 +29,12 @@ if TYPE_CHECKING:
     from ..physics.materials import Material
 
 #: names of moduli in Pa, by model; of any other model it is mu alone
-_MODULI: Mapping[str, tuple[str, ...]] = {"mooney-rivlin": ("mu", "c10", "c01"), "yeoh": ("mu", "c1", "c2", "c3"), "ogden": ("mu",)}
+_MODULI: Mapping[str, tuple[str, ...]] = {
+    "mooney-rivlin": ("mu", "c10", "c01"),
+    "yeoh": ("mu", "c1", "c2", "c3"),
+    "polynomial": ("c10", "c01", "c20", "c11", "c02", "c30", "c21", "c12", "c03"),
+    "ogden": ("mu",),
+}
 
 
 def measured(model: str, **numbers: Any) -> tuple[Material, float]:
@@ -160,9 +166,15 @@ def _ogden(numbers: dict[str, Any], known: Any) -> tuple[dict[str, Any], float |
         return numbers, None  # the material refuses them
     if not all(map(is_number, exponents)) or not all(map(is_number, moduli)):
         return numbers, None
-    twice = math.fsum(m * a for m, a in zip(moduli, exponents, strict=True))
+    of_squares = numbers.get("convention", "mu/alpha") == "2mu/alpha^2"  # mu is the sum of mu_k
+    twice = math.fsum(m * (2.0 if of_squares else a) for m, a in zip(moduli, exponents, strict=True))
     mu = _positive("material.mu", twice / 2, "sum of mu alpha/2, the shear modulus,")
     return {**numbers, "mu": [m / mu for m in moduli]}, mu
+
+
+def _polynomial(numbers: dict[str, Any], known: Any) -> tuple[dict[str, Any], float]:
+    mu = _positive("material.c10", 2 * (numbers.get("c10", 0.0) + numbers.get("c01", 0.0)), "sum of c10 and c01")
+    return {name: value / mu if name in _MODULI["polynomial"] else value for name, value in numbers.items()}, mu
 
 
 def _alone(numbers: Mapping[str, Any], name: str, others: tuple[str, ...]) -> None:
@@ -175,4 +187,5 @@ _OVER_SHEAR_MODULUS: Mapping[str, Callable[[dict[str, Any], Any], tuple[dict[str
     "mooney-rivlin": _mooney_rivlin,
     "yeoh": _yeoh,
     "ogden": _ogden,
+    "polynomial": _polynomial,
 }

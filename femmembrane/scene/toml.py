@@ -90,7 +90,10 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
 #: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
 MAX_BYTES = 2**25
 #: other sources of an argument without a default, for the message when it is missing
-_OTHERWISE = {(Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows"}
+_OTHERWISE = {
+    (Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows",
+    (Scales, "shear_modulus"): "give it in Pa, or the moduli of [material] in Pa, from which it follows",
+}
 
 
 def read_tables(path: str | PathLike[str]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from scipy.constants import mu_0
 
 import femmembrane as fm
 from femmembrane.errors import InputError
+from femmembrane.scene.laboratory import scaled
 
 #: R0 = 20 mm, T = 0.3 mm, mu = 0.4 MPa: mu T/R0 = 6000 Pa, R0^3 = 8 ml
 SCALES = {"radius": 0.02, "thickness": 3e-4, "shear_modulus": 4e5}
@@ -78,7 +79,7 @@ def test_a_mesh_file_has_a_unit(tmp_path):
     assert max(bare.mesh.position(bare.mesh.breakpoints())[0]) == pytest.approx(20, rel=1e-14)
     with pytest.raises(InputError, match=r"mesh.unit = '1 mPa'|mesh.unit.*a length"):
         scene(mesh={**millimetres, "unit": "mPa"})
-    with pytest.raises(InputError, match=r"scales.radius = None: missing"):
+    with pytest.raises(InputError, match=r"mesh.unit = .*needs \[scales\], where radius, thickness, shear_modulus is missing"):
         fm.Scene.from_dict({"material": PLAIN["material"], "mesh": millimetres})
 
 
@@ -144,6 +145,40 @@ def test_loads_besides_the_pressure_by_hand():
     assert weight.weight == pytest.approx(960 * 9.80665 * 0.02 / 4e5, rel=1e-14)
     assert liquid.gamma == pytest.approx(9806.65 * 0.02 / 6000, rel=1e-14)
     assert hub.force == pytest.approx(0.25, rel=1e-14)
+
+
+def test_tables_of_other_physics_by_hand():
+    """Numbers that a scene keeps in SI units lose their unit alone; gas p V over mu T R0^2 = 0.048 J."""
+    tables = scaled(
+        {
+            **PLAIN,
+            "chamber": {"volume": "40 ml", "atmosphere": 6000},
+            "electric": {"voltage": "3 kV", "breakdown": "40 MV/m", "from": "10 mm"},
+            "membrane": {"remanence": "100 mT", "saturation": 0.1},
+            "source": [{"kind": "magnet", "remanence": "1300 mT", "height": 0.05, "inner_radius": "2 mm"}],
+            "run": {"control": "gas", "start": "24 mJ", "hold": {"pressure": "3 kPa"}},
+        }
+    )
+    assert tables["chamber"] == {"volume": pytest.approx(5.0), "atmosphere": pytest.approx(1.0)}
+    assert tables["electric"] == {"voltage": 3000.0, "breakdown": 4e7, "from": 0.5}
+    magnetization = 0.1 / mu_0 / math.sqrt(4e5 / mu_0)
+    assert tables["membrane"] == {"remanence": pytest.approx(magnetization), "saturation": pytest.approx(magnetization)}
+    assert tables["source"][0] == {"kind": "magnet", "remanence": 1.3, "height": 2.5, "inner_radius": 0.1}
+    assert tables["run"] == {"control": "gas", "start": pytest.approx(0.5), "hold": {"pressure": pytest.approx(0.5)}}
+
+
+@pytest.mark.parametrize(
+    ("control", "value", "expected"), [("source.0.height", "50 mm", 2.5), ("source.0.strength", 0.5, None), ("mesh.rim.radius", 0.022, 1.1)]
+)
+def test_numbers_of_the_scene_as_loads(control, value, expected):
+    dipole = {"kind": "dipole", "strength": "0.5 A m^2", "height": 0.05}
+    run = {"control": "arc-length", "over": control, "start": value, "until": {control: value}}
+    tables = scaled({**PLAIN, "source": [dipole], "run": run})
+    wanted = tables["source"][0]["strength"] if expected is None else expected
+    assert tables["run"]["start"] == tables["run"]["until"][control] == pytest.approx(wanted)
+    assert scaled({**PLAIN, "source": [dipole], "run": {"control": control, "values": [value, value]}})["run"]["values"] == pytest.approx(
+        [wanted, wanted]
+    )
 
 
 # --- materials
@@ -260,6 +295,13 @@ def test_units_that_are_refused(units):
         ({"membrane": {"prestretch": "5 mm"}}, "membrane.prestretch", "number"),
         ({"scales": {**SCALES, "radius": "5 kPa"}}, "scales.radius", "a length"),
         ({"scales": {"radius": 1, "thickness": 1}}, "scales.shear_modulus", "moduli of [material] in Pa"),
+        (
+            {"source": [{"kind": "dipole", "height": 0.1, "strength": 1}], "scales": {"radius": 1, "thickness": 1}},
+            "source.height",
+            "moduli in Pa",
+        ),
+        ({"source": [{"kind": "5 cm"}], "scales": {}}, "source.kind", "known"),
+        ({"run": {"control": "volume", "values": [1], "max_steps": "3 kPa"}}, "run.max_steps", "whole"),
         ({"scales": {**SCALES, "radus": 1}}, "scales.radus", "radius"),
         ({"scales": 3}, "scales", "table"),
         ({"run": {"control": "pressure", "values": [1e300]}}, "run.values[0]", "size"),
@@ -274,7 +316,7 @@ def test_numbers_that_are_refused(tables, key, text):
 
 def test_a_number_with_a_unit_needs_scales():
     bare = {"material": {"model": "neo-hookean"}, "run": {"control": "pressure", "values": ["5 kPa"]}}
-    with pytest.raises(InputError, match=r"scales.radius = None: missing; numbers in SI units need \[scales\]"):
+    with pytest.raises(InputError, match=r"run.values\[0\] = 5000.0: a number in SI units needs \[scales\], where radius, thickness"):
         fm.Scene.from_dict(bare)
     with pytest.raises(InputError, match=r'material.mu = 400000.0: its unit is missing: "0.4 MPa"'):
         fm.Scene.from_dict({"material": {"model": "neo-hookean", "mu": 4e5}})

@@ -13,7 +13,7 @@ from ..errors import InputError, unknown_name
 from .scenes import bundled
 
 if TYPE_CHECKING:
-    from ..results.records import Branch
+    from ..results.branch import Branch
     from ..scene import Scene
 
 #: --units of the commands that draw

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 

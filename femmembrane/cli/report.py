@@ -11,7 +11,7 @@ from .folders import System, finished
 from .outcome import DONE, say
 
 if TYPE_CHECKING:
-    from ..results.records import Branch
+    from ..results.branch import Branch
 
 
 def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled") -> int:
@@ -52,7 +52,7 @@ def write(folder: Path, out: Path | None = None, units: str = "scaled") -> Path:
 
 def _without_equilibria(facts: dict[str, Any]) -> Branch:
     """The branch of a run that found nothing and so left no other file."""
-    from ..results.records import Branch
+    from ..results.branch import Branch
     from ..scene import Scene
 
     try:

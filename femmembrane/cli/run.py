@@ -17,8 +17,9 @@ from .progress import observer
 from .report import write as write_report
 
 if TYPE_CHECKING:
+    from ..results.branch import Branch
     from ..results.checkpoint import Checkpoints
-    from ..results.records import Branch, Equilibrium
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 
@@ -137,7 +138,7 @@ def _compute(scene: Scene, interrupts: Interrupts, checkpoints: Checkpoints) -> 
 
 def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Status, message: str) -> Branch:
     """The branch of the equilibria found before the computation ended early. Special points are not searched for."""
-    from ..results.records import Branch
+    from ..results.branch import Branch
 
     used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
     asked = used.run

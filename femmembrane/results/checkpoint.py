@@ -21,7 +21,7 @@ from .table import columns, reader
 
 if TYPE_CHECKING:
     from ..scene import Scene
-    from .records import Branch
+    from .branch import Branch
 
 NAME = "checkpoint.nc"
 #: seconds of work that may be lost, unless saving takes long

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from ..quantities import PLACES, words, written
-from .records import Equilibrium
+from .equilibrium import Equilibrium
 
 
 @dataclass(frozen=True, eq=False)

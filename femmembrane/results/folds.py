@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..errors import Status
 from ..quantities import heading, words
 from . import door
-from .records import Equilibrium, SpecialPoint
+from .equilibrium import Equilibrium
+from .special_point import SpecialPoint
 
 Array = NDArray[np.float64]
 

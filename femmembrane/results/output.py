@@ -26,7 +26,7 @@ from .store import save
 from .table import write_csv, write_special_points_csv
 
 if TYPE_CHECKING:
-    from .records import Branch
+    from .branch import Branch
 
 #: the record of a run, which makes its folder complete
 RECORD = "run.json"

@@ -21,8 +21,8 @@ from ..origin import package_version
 from ..scene import Scene
 from .analyses import asked, known_quantity, typed_column
 from .analyses.base import Variable
+from .branch import Branch
 from .netcdf import read_dataset, reason, write_dataset
-from .records import Branch
 from .stored_points import (
     LIMIT,
     SPECIAL,

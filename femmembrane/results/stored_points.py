@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from ..errors import Status
 from ..quantities import typed
 from .analyses.base import Variable
-from .records import Equilibrium, Jump, PathMemory, SpecialPoint, TraceMemory
+from .equilibrium import Equilibrium
+from .path_memory import PathMemory, TraceMemory
+from .special_point import Jump, SpecialPoint
 
 if TYPE_CHECKING:
     import xarray

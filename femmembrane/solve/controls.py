@@ -146,11 +146,22 @@ class Gas:
         return dp * total + absolute * float(evaluation.volume_gradient @ dx)
 
     def rest(self, space: Space) -> float:
-        """The amount that holds the undeformed membrane."""
+        """The amount that holds the undeformed membrane.
+
+        Parameters
+        ----------
+        space : Space
+        """
         return self.atmosphere * (space.reference_volume + self.chamber)
 
     def refusal(self, pressure: float, volume: float) -> str:
-        """Why no amount of the gas holds a state with this pressure and volume; empty where one does."""
+        """Why no amount of the gas holds a state with this pressure and volume; empty where one does.
+
+        Parameters
+        ----------
+        pressure, volume : float
+            Of the state.
+        """
         if (pressure + self.atmosphere) * (volume + self.chamber) > 0 and volume > -self.chamber:
             return ""
         return "the start does not compress the gas (P + atmosphere <= 0); start at a larger volume"
@@ -225,10 +236,21 @@ class Controlled(Protocol):
         """
 
     def rest(self, space: Space, /) -> float:
-        """The number in the undeformed membrane."""
+        """The number in the undeformed membrane.
+
+        Parameters
+        ----------
+        space : Space
+        """
 
     def refusal(self, pressure: float, volume: float) -> str:
-        """Why no load of the control holds a state with this pressure and volume; empty where one does."""
+        """Why no load of the control holds a state with this pressure and volume; empty where one does.
+
+        Parameters
+        ----------
+        pressure, volume : float
+            Of the state.
+        """
 
 
 @dataclass(frozen=True)

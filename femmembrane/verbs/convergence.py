@@ -11,7 +11,7 @@ from ..checks import only, switch
 from ..errors import SolveError, Status
 from ..potential import Array, potential_of
 from ..results.convergence import COMPARED, PROFILES, ROUND_OFF, Convergence
-from ..results.records import Equilibrium
+from ..results.equilibrium import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CONTROLS, Control, control_kind
 from ..solve.finer_space import transferred

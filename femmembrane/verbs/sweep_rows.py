@@ -13,7 +13,9 @@ from scipy.optimize import brentq
 from ..checks import choice, number
 from ..errors import FemmembraneError, InputError, SolveError, Status
 from ..quantities import PLACES
-from ..results.records import Branch, Equilibrium, SpecialPoint
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.special_point import SpecialPoint
 from ..scene import Analysis, Scene
 from .follow import equilibrium, run
 from .search import equilibria

@@ -11,7 +11,10 @@ from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..quantities import PLACES
-from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.path_memory import TraceMemory
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..solve import state_resolution, wellposed
 from ..solve.branch import FOLDS, BranchProblem, first_point, oriented_point

@@ -18,7 +18,9 @@ from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, z
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..results.records import Branch, Equilibrium, SpecialPoint
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
+    from ..results.special_point import SpecialPoint
 
 Array = NDArray[np.float64]
 

@@ -33,7 +33,8 @@ from .surroundings import place_of
 from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
 if TYPE_CHECKING:
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: codes of XDMF's mixed topology
 _TRIANGLE, _QUAD = 4, 5

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
 
 _DPI = 160
 

@@ -12,7 +12,8 @@ from ..quantities import PLACES, title
 from ..results.analyses import column_heading, remarks
 
 if TYPE_CHECKING:
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: most rows of a table of equilibria
 MOST_ROWS = 60

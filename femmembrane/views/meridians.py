@@ -16,7 +16,7 @@ from .zones import draw_meridian_zones
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
 
 #: points of a drawn meridian
 _CURVE = 201

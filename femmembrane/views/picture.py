@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     import pyvista
 
     from ..physics.outline import Outline
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 Array = NDArray[np.float64]

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..results.records import Branch
+    from ..results.branch import Branch
 
 __all__ = [
     "BOTH",

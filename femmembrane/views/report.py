@@ -32,7 +32,8 @@ from .zones import new_label
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: inches: text is of a readable size in a column of a screen and on a phone
 _WIDTH, _HEIGHT = 4.7, 3.9

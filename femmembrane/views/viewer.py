@@ -23,7 +23,8 @@ from .surroundings import Box, place_of
 if TYPE_CHECKING:
     import pyvista
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: sizes of a window and a picture, and of a movie; its frames take a quarter of a second each without a graphics card
 SIZE, MOVIE_SIZE = (1200, 900), (720, 540)

@@ -29,7 +29,7 @@ from ..quantities import PROFILE, in_si, quantity, si_values
 from ..results.analyses import asked
 
 if TYPE_CHECKING:
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
 
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)

@@ -15,7 +15,8 @@ import pytest
 import femmembrane
 from femmembrane import cli
 from femmembrane.errors import SolveError, Status
-from femmembrane.results.records import Branch, Equilibrium
+from femmembrane.results.branch import Branch
+from femmembrane.results.equilibrium import Equilibrium
 from femmembrane.scene import Scene
 
 ROOT = Path(__file__).parents[2]

@@ -21,7 +21,7 @@ from .wrinkled_zones import WrinkledZones
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Equilibrium
+    from ..equilibrium import Equilibrium
 
 _VERDICTS = Verdicts()
 #: those that a scene asks for by keys of their own, in the order of their columns

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
     from ...potential import Evaluation
     from ...scene import Scene
-    from ..records import Branch, Equilibrium, SpecialPoint
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
+    from ..special_point import SpecialPoint
 
 Array = NDArray[np.float64]
 #: one cell of a table

@@ -10,7 +10,8 @@ from .base import Cell, EquilibriumAnalysis, PrintedColumn
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Equilibrium, SpecialPoint
+    from ..equilibrium import Equilibrium
+    from ..special_point import SpecialPoint
 
 
 class SIColumns(EquilibriumAnalysis):

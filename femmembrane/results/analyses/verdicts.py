@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     from ...potential import Evaluation
     from ...scene import Scene
-    from ..records import Branch, Equilibrium
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
 
 #: controls whose verdicts are printed of a scene that asks for none
 _PRINTED = ("pressure", "volume")

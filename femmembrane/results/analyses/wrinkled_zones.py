@@ -18,7 +18,8 @@ from .verdicts import stretches
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Branch, Equilibrium
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
 
 #: the columns of ``zones.csv``; variables have these names after ``zone_``
 ZONE_COLUMNS = ("step", "kind", "r_start", "r_end", "rho_start", "rho_end", "area_fraction", "deformed_area_fraction")

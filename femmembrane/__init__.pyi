@@ -74,6 +74,7 @@ from .results.zones import Zones as Zones
 from .scene import Analysis as Analysis
 from .scene import Run as Run
 from .scene import Scene as Scene
+from .scene.moduli import measured as measured
 from .solve.continuation import StepControl as StepControl
 from .solve.controls import Gas as Gas
 from .stability.jacobi import jacobi_test as jacobi_test

@@ -6,12 +6,14 @@ Tables, CSV and NetCDF files, pictures, pages and sweeps ask here. A new quantit
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .errors import InputError, unknown_name
 
 #: SI unit of every kind of quantity that :class:`~femmembrane.Scales` converts
 SI_UNITS: Mapping[str, str] = {
@@ -20,9 +22,15 @@ SI_UNITS: Mapping[str, str] = {
     "pressure": "Pa",
     "stress": "Pa",
     "energy": "J",
+    "force": "N",
+    "field": "A/m",
+    "weight": "kg/m^3",
+    "gamma": "kg/m^3",
     "dipole_strength": "A m^2",
     "remanence": "T",
     "magnetization": "A/m",
+    "wire_strength": "A",
+    "uniform_strength": "T",
 }
 
 
@@ -60,6 +68,68 @@ class Quantity:
     type: type[float] | type[int] | type[str] = float
 
 
+@dataclass(frozen=True)
+class Units:
+    """The units in which a picture or a page shows quantities.
+
+    Attributes
+    ----------
+    scales : Scales or None
+        None: those of the package. Else SI units with the prefix that suits the size of these scales, whatever is shown: branches of one
+        membrane have the same units.
+    """
+
+    scales: Converter | None = None
+
+    @classmethod
+    def of(cls, units: str, scales: Converter | None) -> Units:
+        """The units that a word stands for, of a scene with or without scales.
+
+        Raises
+        ------
+        InputError
+            For an unknown word, and for "si" without scales.
+        """
+        if units not in SYSTEMS:
+            raise unknown_name("units", units, SYSTEMS)
+        if units == "si" and scales is None:
+            raise InputError("units", units, "the scene has no [scales] from which SI units would follow; 'scaled' is allowed")
+        return cls(scales if units == "si" else None)
+
+    def unit(self, name: str) -> str:
+        """The SI unit of a quantity; empty where it is shown in units of the package."""
+        return self._chosen(name)[0]
+
+    def factor(self, name: str) -> float:
+        """By what a quantity in units of the package is multiplied."""
+        return self._chosen(name)[1]
+
+    def _chosen(self, name: str) -> tuple[str, float]:
+        kind = quantity(name).si
+        if self.scales is None or not kind:
+            return "", 1.0
+        scale = float(self.scales.to_si(kind, 1.0))
+        unit, size = _fitting(kind, scale)
+        return unit, scale / size
+
+
+#: those of the package
+SCALED = Units()
+
+
+def _fitting(kind: str, value: float) -> tuple[str, float]:
+    """The unit in which a person reads a value in SI units, and what it is."""
+    return ([pair for pair in _READ[kind] if pair[1] <= abs(value)] or [_READ[kind][0]])[-1]
+
+
+def readable(name: str, value: float, scales: Converter) -> str:
+    """A value of a quantity in the SI unit that suits it, such as "6.8 MPa"."""
+    kind = quantity(name).si
+    found = float(scales.to_si(kind, value))
+    unit, size = _fitting(kind, found)
+    return f"{found / size:.4g} {unit}"
+
+
 class Converter(Protocol):
     """What turns non-dimensional values into SI units: :class:`~femmembrane.Scales`."""
 
@@ -76,16 +146,23 @@ _STRESSES = {
 QUANTITIES: Mapping[str, Quantity] = {
     "step": Quantity("number of the equilibrium along the branch", type=int),
     "volume": Quantity("enclosed volume V/R0^3, signed", symbol="V", label="volume V/R₀³", si="volume"),
-    "volume_m3": Quantity("enclosed volume, signed", "m^3"),
+    "volume_m3": Quantity("enclosed volume, signed", "m^3", symbol="V in m³", words="volume V"),
     "pressure": Quantity("pressure P = p R0/(mu T)", symbol="P", label="pressure P = pR₀/(μT)", form=".8g", si="pressure"),
-    "pressure_pa": Quantity("pressure p", "Pa"),
+    "pressure_pa": Quantity("pressure p", "Pa", symbol="p in Pa", words="pressure p"),
     "center_height": Quantity(
         "height of the pole, or the first point of the meridian, over R0", words="pole height", label="pole height η(0)/R₀", si="length"
+    ),
+    "center_height_m": Quantity(
+        "height of the pole, or the first point of the meridian", "m", symbol="pole height in m", words="pole height"
     ),
     "energy": Quantity("elastic, magnetic and load energy over mu T R0^2", symbol="E total", words="total energy", form=".8g", si="energy"),
     "elastic_energy": Quantity("elastic energy over mu T R0^2", symbol="E elastic", si="energy"),
     "magnetic_energy": Quantity("magnetic energy over mu T R0^2", symbol="E magnetic", si="energy"),
     "load_energy": Quantity("energy of the loads over mu T R0^2", symbol="E loads", si="energy"),
+    "energy_j": Quantity("elastic, magnetic and load energy", "J", symbol="E total in J", words="total energy"),
+    "elastic_energy_j": Quantity("elastic energy", "J", symbol="E elastic in J", words="elastic energy"),
+    "magnetic_energy_j": Quantity("magnetic energy", "J", symbol="E magnetic in J", words="magnetic energy"),
+    "load_energy_j": Quantity("energy of the loads", "J", symbol="E loads in J", words="energy of the loads"),
     "residual": Quantity("out-of-balance force relative to the forces in balance"),
     "iterations": Quantity("solver iterations, rejected attempts included", type=int),
     "seconds": Quantity("wall time spent on the equilibrium", "s"),
@@ -99,9 +176,12 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "rho": Quantity("deformed radius over R0", label="radius ρ/R₀", si="length"),  # noqa: RUF001
     "eta": Quantity("deformed height over R0", label="height η/R₀", si="length"),
-    "r_m": Quantity("reference radius of the node", "m"),
-    "rho_m": Quantity("deformed radius", "m"),
-    "eta_m": Quantity("deformed height", "m"),
+    "r_m": Quantity("reference radius of the node", "m", words="reference radius r"),
+    "s_m": Quantity(
+        "arc length of the reference meridian from its first end to the node", "m", words="arc length of the reference meridian s"
+    ),
+    "rho_m": Quantity("deformed radius", "m", words="radius"),
+    "eta_m": Quantity("deformed height", "m", words="height"),
     "stretch_1": Quantity("meridional stretch"),
     "stretch_2": Quantity("circumferential stretch"),
     **{name: Quantity(f"{stress} over mu", si="stress") for name, stress in _STRESSES.items()},
@@ -200,7 +280,17 @@ _OF_VERDICTS: Mapping[str, Quantity] = {
     "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
 }
 #: what follows the name of a quantity of each kind where it is given in SI units
-_IN_SI = {"length": "m", "volume": "m3", "pressure": "pa", "stress": "pa"}
+_IN_SI = {"length": "m", "volume": "m3", "pressure": "pa", "stress": "pa", "energy": "j"}
+#: units in which a person reads a quantity, from small to large, and what they are in SI units
+_READ: Mapping[str, tuple[tuple[str, float], ...]] = {
+    "length": (("µm", 1e-6), ("mm", 1e-3), ("m", 1.0)),
+    "volume": (("µl", 1e-9), ("ml", 1e-6), ("l", 1e-3), ("m³", 1.0)),
+    "pressure": (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6)),
+    "stress": (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6)),
+    "energy": (("µJ", 1e-6), ("mJ", 1e-3), ("J", 1.0)),
+}
+#: words for the units in which pictures and pages show quantities
+SYSTEMS = ("scaled", "si")
 #: labels of numbers of a scene, by the pattern of their key
 _KEYS = (
     (r"source(?:\.\d+)?\.strength", "dipole strength M = μ₀D²/(R₀⁶μ)"),
@@ -244,14 +334,22 @@ def heading(name: str) -> str:
     return quantity(name).symbol or words(name)
 
 
+def heading_in(name: str, units: Units) -> str:
+    """The heading of a column that shows the quantity in these units."""
+    unit = units.unit(name)
+    return f"{heading(in_si(name)).partition(' in ')[0]} in {unit}" if unit else heading(name)
+
+
 def title(name: str) -> str:
     """Words and symbol of a quantity, such as "pressure P"."""
     known = quantity(name)
     return f"{words(name)} {known.symbol}" if len(known.symbol) == 1 else words(name)
 
 
-def axis_label(name: str) -> str:
-    """Text at an axis."""
+def axis_label(name: str, units: Units | None = None) -> str:
+    """Text at an axis, which shows the quantity in these units."""
+    if units is not None and (unit := units.unit(name)):
+        return f"{words(in_si(name))} in {unit}"
     return quantity(name).label or words(name)
 
 
@@ -268,9 +366,16 @@ def written(name: str, value: Any, width: int = 0) -> str:
     return f"{value:>{width or ''}{quantity(name).form}}"
 
 
-def caption(volume: float, pressure: float, between: str = "  ") -> str:
+def caption(volume: float, pressure: float, between: str = "  ", units: Units | None = None) -> str:
     """Volume and pressure of an equilibrium at a curve or in a line, to four digits."""
-    return f"{QUANTITIES['volume'].symbol} = {volume:.4g}{between}{QUANTITIES['pressure'].symbol} = {pressure:.4g}"
+    return between.join(f"{symbol} = {text}" for symbol, text in _in_units({"volume": volume, "pressure": pressure}, units or SCALED))
+
+
+def _in_units(values: Mapping[str, float], units: Units) -> Iterator[tuple[str, str]]:
+    """Symbol, and value with its unit, of each quantity."""
+    for name, value in values.items():
+        unit = units.unit(name)
+        yield heading_in(name, units).partition(" in ")[0], f"{value * units.factor(name):.4g}" + (f" {unit}" if unit else "")
 
 
 def in_si(name: str) -> str:

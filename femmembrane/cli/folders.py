@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from cyclopts import Parameter
 
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from ..results.branch import Branch
     from ..scene import Scene
 
-
+#: --units of the commands that draw
+System: TypeAlias = Literal["scaled", "si"]
 #: --set of the commands that read a scene
 Changes = Annotated[
     list[str] | None,
@@ -33,7 +34,18 @@ def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = 
     from ..memory import require_libraries
 
     require_libraries()
-    from ..scene import Scene, read_tables
+    from ..scene import Scene
+
+    tables, folder = tables_of(path, changes)
+    scene = Scene.from_dict(tables, folder)
+    if needs_run and scene.run is None:
+        raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
+    return scene
+
+
+def tables_of(path: Path, changes: Sequence[str] | None = None) -> tuple[dict[str, Any], Path]:
+    """The tables of a scene file with the values of ``--set``, and the folder of the file."""
+    from ..scene import read_tables
 
     if not path.suffix and not path.exists():
         path = _bundled(str(path))
@@ -42,10 +54,14 @@ def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = 
         from ..scene.keys import set_all
 
         tables = set_all("--set", tables, changes)
-    scene = Scene.from_dict(tables, path.parent)
-    if needs_run and scene.run is None:
-        raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
-    return scene
+    return tables, path.parent
+
+
+def units_of(path: Path, changes: Sequence[str] | None, asked: str | None) -> str:
+    """The units of pictures and pages: those asked for, else those of the scene file."""
+    if asked is None:
+        return str(tables_of(path, changes)[0].get("units", "scaled"))
+    return asked
 
 
 def _bundled(name: str) -> Path:

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Status
-from .folders import finished
+from .folders import System, finished
 from .outcome import DONE, say
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
 
 
-def report(folder: Path, /, *, out: Path | None = None) -> int:
+def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled") -> int:
     """Write one HTML page about a finished run: figures, verdicts, special points, zones, error estimates, scene, timings, versions.
 
     The page needs no network, and has what the run has. Exit codes: 0 done, 2 bad input.
@@ -25,14 +25,16 @@ def report(folder: Path, /, *, out: Path | None = None) -> int:
         Folder of a run, or a branch that was saved (.nc).
     out
         HTML file to write; report.html in the folder by default.
+    units
+        Of figures and ranges: those of the package, or SI units by the [scales] of the scene.
     """
-    page = write(folder, out)
+    page = write(folder, out, units)
     if sys.stdout.isatty():
         say(f"written:\n  {page}\n")
     return DONE
 
 
-def write(folder: Path, out: Path | None = None) -> Path:
+def write(folder: Path, out: Path | None = None, units: str = "scaled") -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
     from ..files import remove_leftovers
     from ..results.output import read_record
@@ -44,7 +46,7 @@ def write(folder: Path, out: Path | None = None) -> Path:
     branch = _without_equilibria(facts) if alone else finished(folder, facts)
     page = inside / "report.html" if out is None else out
     remove_leftovers(page.parent)
-    write_report(branch, page, facts)
+    write_report(branch, page, facts, units=units)
     return page
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
-from .folders import Changes, finished, read, working
+from .folders import Changes, System, finished, read, units_of, working
 from .interrupts import Interrupts
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
 from .progress import observer
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = False, report: bool = False) -> int:
+def run(
+    scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = False, report: bool = False, units: System | None = None
+) -> int:
     """Compute the equilibria that a scene file asks for and write them to a folder.
 
     Now and then the branch so far is saved as checkpoint.nc: --resume goes on from there after an interrupt, a kill or a full disk. One run
@@ -42,10 +44,19 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         Go on where a run of the same scene in this folder was interrupted; without one, start.
     report
         Write report.html as well, one page about the run.
+    units
+        Of pictures and the report: those of the package, or SI units by the [scales] of the scene; those of the scene file unless given.
     """
     asked = read(scene, changes)
+    from ..quantities import Units
     from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
     from ..results.output import SURFACES_FOLDER, run_files
+    from ..scene.absurd_loads import remarks_on_loads
+
+    system = units_of(scene, changes, units)
+    Units.of(system, asked.scales)
+    for remark in remarks_on_loads(asked):
+        fail(DONE, remark)
 
     with working(out, (*run_files(), NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
         kept = unfinished(out) if resume else None
@@ -64,9 +75,9 @@ def run(scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = Fa
         try:
             if code == INTERRUPTED:
                 checkpoints.save()
-            written = _write(branch, out, scene, changes or ())
+            written = _write(branch, out, scene, changes or (), system)
             if report:
-                written.append(write_report(out))
+                written.append(write_report(out, units=system))
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, _kept(error, checkpoints, out))
         if code != INTERRUPTED:
@@ -135,13 +146,13 @@ def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Stat
     return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver)
 
 
-def _write(branch: Branch, out: Path, scene: Path, changes: Sequence[str]) -> list[Path]:
+def _write(branch: Branch, out: Path, scene: Path, changes: Sequence[str], units: str) -> list[Path]:
     import shlex
 
     from ..results.output import write_run
 
     words = ["femmembrane", "run", str(scene), *(word for change in changes for word in ("--set", change)), "--out", str(out)]
-    return write_run(branch, out, command=shlex.join(words))
+    return write_run(branch, out, command=shlex.join(words), units=units)
 
 
 def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:

@@ -16,6 +16,12 @@ TEMPLATE = """\
 # A scene: what exists and what is asked of it. Lengths are in units of the radius of the rim, stresses in units of the shear
 # modulus. Only what stands here is built and computed; remove the # before a line to ask for it.
 title = "{title}"
+# units = "si"                           # numbers in m, m^3, Pa, ...; with or without it "5 kPa", "20 mm": both need [scales]
+
+# [scales]
+# radius = "25 mm"
+# thickness = "0.3 mm"
+# shear_modulus = "0.4 MPa"
 
 [material]
 model = "neo-hookean"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .folders import Changes, read, working
+from .folders import Changes, System, read, tables_of, units_of, working
 from .interrupts import Interrupts
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, refused, say
 
@@ -33,6 +33,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     dry_run: bool = False,
+    units: System | None = None,
 ) -> int:
     """Compute one quantity of every scene of a grid, and write sweep.nc and a map, sweep.png, to a folder.
 
@@ -63,18 +64,30 @@ def sweep(
         Address of a running Dask scheduler, tcp://HOST:PORT, whose workers compute.
     dry_run
         Only say how many scenes there are and how long they will take, from a few that are timed.
+    units
+        Of the map: those of the package, or SI units by the [scales] of the scene; those of the scene file unless given. Values of --over,
+        --pressure and --volume are meant as in the scene file.
     """
+    from ..quantities import Units
     from ..scene.keys import values_of
+    from ..scene.laboratory import values_in_file
     from ..verbs.sweep import plan_sweep
     from ..verbs.sweep import sweep as compute
 
     asked = read(scene, changes, needs_run=quantity != "equilibria")
+    system = units_of(scene, changes, units)
+    Units.of(system, asked.scales)
+    tables, _ = tables_of(scene, changes)
+    if asked.scales is not None and tables.get("units") == "si":
+        pressure, volume = (
+            None if load is None else asked.scales.from_si(name, load) for name, load in (("pressure", pressure), ("volume", volume))
+        )
     grid: dict[str, Any] = {}
     for text in over:
         key, values = values_of("--over", text)
         if key in grid:
             raise InputError("--over", text, "each key once is allowed")
-        grid[key] = values
+        grid[key] = values_in_file(tables, key, values)
     what: dict[str, Any] = {"quantity": quantity, "pressure": pressure, "volume": volume, "direction": direction, "workers": workers}
     if dry_run:
         say(f"{plan_sweep(asked, grid, out=out, **what)}\n")
@@ -102,7 +115,7 @@ def sweep(
         try:
             found.save(written[0])
             if len(written) > 1:
-                found.plot(written[1])
+                found.plot(written[1], units=system)
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if not results:

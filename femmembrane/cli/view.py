@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import SolveError
-from .folders import finished
+from .folders import System, finished
 from .outcome import DONE, NOT_CONVERGED, explain, fail
 
 
@@ -18,6 +18,7 @@ def view(
     mode: int | None = None,
     screenshot: Path | None = None,
     movie: Path | None = None,
+    units: System = "scaled",
 ) -> int:
     """Show the membrane of a run in space: a window with a slider over the steps, or a picture or movie, which need no display.
 
@@ -36,6 +37,8 @@ def view(
         PNG file to write.
     movie
         GIF or MP4 file to write (MP4 with imageio[ffmpeg] installed).
+    units
+        Of numbers and stresses: those of the package, or SI units by the [scales] of the scene.
     """
     from ..files import remove_leftovers
     from ..views.viewer import view as show
@@ -43,7 +46,7 @@ def view(
     for file in filter(None, (screenshot, movie)):
         remove_leftovers(file.parent)
     try:
-        show(finished(folder), color=color, step=step, mode=mode, screenshot=screenshot, movie=movie)
+        show(finished(folder), color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units)
     except SolveError as error:
         return fail(NOT_CONVERGED, explain(error.status, str(error)))
     return DONE

@@ -8,13 +8,22 @@ quantity               unit                  SI
 ``pressure``           mu T/R0               Pa
 ``stress``             mu                    Pa
 ``energy``             mu T R0^2             J
+``force``              mu T R0               N
+``field``              sqrt(mu/mu0)          A/m
+``weight``             mu/(g R0)             kg/m^3
+``gamma``              mu T/(g R0^2)         kg/m^3
 ``dipole_strength``    see below             A m^2
 ``remanence``          sqrt(mu mu0)          T
 ``magnetization``      sqrt(mu/mu0)          A/m
+``wire_strength``      see below             A
+``uniform_strength``   see below             T
 =====================  ====================  =========
 
+``weight`` and ``gamma`` are the numbers of the loads ``Weight`` and ``Hydrostatic``: densities, with the standard gravity g.
+
 A dipole of the physical moment m has the strength M = mu0 D^2/(R0^6 mu) with D = m/(4 pi) (paper eq. 33). So M = (m/m_0)^2 with
-m_0 = 4 pi R0^3 sqrt(mu/mu0).
+m_0 = 4 pi R0^3 sqrt(mu/mu0). A wire with the current I has M = (I/I_0)^2 with I_0 = 2 pi R0 sqrt(mu/mu0), and a uniform flux
+density B has M = (B/B_0)^2 with B_0 = sqrt(mu mu0).
 """
 
 from __future__ import annotations
@@ -31,9 +40,12 @@ from ..checks import as_float, choice, is_number
 from ..errors import InputError
 from ..quantities import SI_UNITS
 from .magnetics import Dipole
+from .units import has_unit, in_unit
 
-#: quantities that scale with sqrt(mu) alone; asked for by scenes with magnets
-_MAGNETIC = ("remanence", "magnetization")
+#: strengths are squares of what is measured
+SQUARED = ("dipole_strength", "wire_strength", "uniform_strength")
+#: kinds whose units must be numbers in every scene; others when they are asked for
+_ALWAYS = ("length", "volume", "pressure", "stress", "energy")
 #: relative difference up to which two numbers that say the same thing agree
 AGREEMENT = 1e-9
 
@@ -84,7 +96,7 @@ class Scales:
             if not (is_number(value) and as_float(value) > 0):  # of any size: what follows from them is what counts
                 raise InputError(f"scales.{name}", value, f"a finite number > 0 is allowed (in {unit[name]})")
             object.__setattr__(self, name, float(value))
-        for quantity in SI_UNITS.keys() - {"dipole_strength", *_MAGNETIC}:
+        for quantity in _ALWAYS:
             self._unit(quantity)
         self._in_range("radius over thickness", self.radius_to_thickness)
         if self.dipole_moment is not None:
@@ -115,7 +127,8 @@ class Scales:
 
         Parameters
         ----------
-        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength", "remanence", "magnetization"}
+        quantity : str
+            One of the table of this module.
 
         Raises
         ------
@@ -136,7 +149,8 @@ class Scales:
 
         Parameters
         ----------
-        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength", "remanence", "magnetization"}
+        quantity : str
+            One of the table of this module.
         value : float or array_like
             In the units of the package; volumes and energies with the 2 pi.
 
@@ -152,10 +166,10 @@ class Scales:
         """
         given = _values(quantity, value)
         with np.errstate(over="ignore"):
-            return _converted(value, given, (np.sqrt(given) if quantity == "dipole_strength" else given) * self._unit(quantity))
+            return _converted(value, given, (np.sqrt(given) if quantity in SQUARED else given) * self._unit(quantity))
 
     @overload
-    def from_si(self, quantity: str, value: float) -> float: ...
+    def from_si(self, quantity: str, value: float | str) -> float: ...
 
     @overload
     def from_si(self, quantity: str, value: NDArray[Any] | Sequence[Any]) -> Array: ...
@@ -165,9 +179,10 @@ class Scales:
 
         Parameters
         ----------
-        quantity : {"length", "volume", "pressure", "stress", "energy", "dipole_strength", "remanence", "magnetization"}
-        value : float or array_like
-            In ``units(quantity)``; for a dipole strength, the moment.
+        quantity : str
+            One of the table of this module.
+        value : float, array_like or str
+            In ``units(quantity)``; for a dipole strength, the moment. A text has its unit with it: "5 kPa", "20 mm".
 
         Returns
         -------
@@ -177,13 +192,16 @@ class Scales:
         Raises
         ------
         InputError
-            For an unknown quantity, a value that is no number or too large for a float without its unit, or a negative moment (the sense of
-            a moment is the orientation of its dipole).
+            For an unknown quantity, a value that is no number or too large for a float without its unit, a unit of another kind, or a
+            negative moment (the sense of a moment is the orientation of its dipole).
         """
+        if has_unit(value):
+            _check_quantity(quantity)
+            value = in_unit("value", value, SI_UNITS[quantity])[0]
         given = _values(quantity, value)
         with np.errstate(over="ignore"):
             ratio = given / self._unit(quantity)
-            return _converted(value, given, ratio * ratio if quantity == "dipole_strength" else ratio)
+            return _converted(value, given, ratio * ratio if quantity in SQUARED else ratio)
 
     def fits(self, sources: Iterable[Any]) -> bool:
         """Whether one of the sources has the moment ``dipole_moment``, to 1e-9 of its strength; true where no moment is given.
@@ -199,16 +217,23 @@ class Scales:
 
     def _unit(self, quantity: str) -> float:
         R, T, mu = self.radius, self.thickness, self.shear_modulus
-        if quantity == "dipole_strength":
-            from scipy.constants import mu_0  # here, so that reading a scene without a moment need not wait for it
-
-            unit = 4 * math.pi * R * R * R * math.sqrt(mu / mu_0)
-        elif quantity in _MAGNETIC:
-            from scipy.constants import mu_0
-
-            unit = math.sqrt(mu / mu_0) * (mu_0 if quantity == "remanence" else 1)
-        else:
+        if quantity in _ALWAYS:
             unit = {"length": R, "volume": R * R * R, "pressure": mu * T / R, "stress": mu, "energy": mu * T * R * R}[quantity]
+        else:
+            from scipy.constants import g, mu_0  # here, so that reading a scene without them need not wait for it
+
+            field = math.sqrt(mu / mu_0)
+            unit = {
+                "force": mu * T * R,
+                "field": field,
+                "weight": mu / g / R,
+                "gamma": mu * T / R / g / R,
+                "dipole_strength": 4 * math.pi * R * R * R * field,
+                "wire_strength": 2 * math.pi * R * field,
+                "uniform_strength": mu_0 * field,
+                "remanence": mu_0 * field,
+                "magnetization": field,
+            }[quantity]
         return self._in_range(f"the unit of {quantity}", unit)
 
     def _in_range(self, what: str, number: float) -> float:
@@ -229,8 +254,10 @@ def _values(quantity: str, value: Any) -> Array:
         raise InputError("value", value, "a number or an array of numbers is allowed") from None
     if array.dtype.kind not in "iuf":
         raise InputError("value", value, "a number or an array of numbers is allowed")
-    if quantity == "dipole_strength" and not (array >= 0).all():
-        raise InputError("value", value, "a strength or moment >= 0 is allowed; the sense of a moment is the orientation of its dipole")
+    if quantity in SQUARED and not (array >= 0).all():
+        raise InputError(
+            "value", value, "a strength, moment, current or flux density >= 0 is allowed; its sense is the orientation of the source"
+        )
     return array.astype(np.float64)
 
 

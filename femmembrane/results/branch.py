@@ -114,7 +114,8 @@ class Branch(Sequence[Equilibrium]):
         name : str
             ``step``, ``status``, any column of the table or an energy. ``lambda_`` or ``verdict_`` is followed by pressure, volume, n1, n2,
             ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for error estimates (relative errors at
-            the load that its [run] prescribes, else at the volume). A scene with scales has ``pressure_pa`` as well.
+            the load that its [run] prescribes, else at the volume). A scene with scales has ``pressure_pa``, ``volume_m3``,
+            ``center_height_m``, ``elastic_energy_j``, ... as well.
 
         Raises
         ------
@@ -147,11 +148,14 @@ class Branch(Sequence[Equilibrium]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The remarks, what was repaired in the points of the mesh, and what was done about motions of the whole that nothing resists."""
+        """The remarks, loads that no such membrane holds, repairs of the mesh, and what was done about motions that nothing resists."""
         from ..discretization.space import space_of_scene
+        from ..scene.absurd_loads import remarks_on_loads
 
         repaired = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "repaired", ()))
-        return self.remarks if self.scene.open else (*self.remarks, *repaired, *space_of_scene(self.scene).notes)
+        if self.scene.open:
+            return self.remarks
+        return (*self.remarks, *remarks_on_loads(self.scene), *repaired, *space_of_scene(self.scene).notes)
 
     def zones_along(self) -> ZonesAlong:
         """Zones of all equilibria and, where their kinds change from one to the next, of states between them."""
@@ -190,24 +194,33 @@ class Branch(Sequence[Equilibrium]):
         """
         door.write_vtk(self, path)
 
-    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+    def plot(self, path: str | PathLike[str] | None = None, *, units: str = "scaled") -> Any:
         """Pressure against volume as a Matplotlib figure.
 
         Parameters
         ----------
         path : path, optional
             Where the figure is also written.
-        """
-        return door.plot_pressure_volume(self, path)
+        units : {"scaled", "si"}
+            In units of the package, or in SI units such as ml and kPa, by the scales of the scene.
 
-    def report(self, path: str | PathLike[str]) -> None:
+        Raises
+        ------
+        InputError
+            For a file that cannot be written, and for SI units of a scene without scales.
+        """
+        return door.plot_pressure_volume(self, path, units)
+
+    def report(self, path: str | PathLike[str], *, units: str = "scaled") -> None:
         """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings.
 
         Parameters
         ----------
         path : path
+        units : {"scaled", "si"}
+            As for :meth:`plot`.
         """
-        door.write_report(self, path)
+        door.write_report(self, path, units)
 
     def cite(self) -> str:
         """BibTeX of what the computation used."""

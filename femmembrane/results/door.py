@@ -83,11 +83,11 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
 # --- pictures and pages
 
 
-def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
+def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None, units: str = "scaled") -> Any:
     """See :func:`femmembrane.views.plots.plot_pressure_volume`."""
     from ..views.plots import plot_pressure_volume
 
-    return plot_pressure_volume(branch, path)
+    return plot_pressure_volume(branch, path, units=units)
 
 
 def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
@@ -125,11 +125,11 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Any:
     return plot_cost(study, path)
 
 
-def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None) -> Any:
+def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Any:
     """See :func:`femmembrane.views.grid.plot_grid`."""
     from ..views.grid import plot_grid
 
-    return plot_grid(sweep, path, show)
+    return plot_grid(sweep, path, show, units)
 
 
 def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[Path]:
@@ -146,11 +146,11 @@ def remove_surfaces(path: Path) -> None:
     remove_surfaces(path)
 
 
-def write_report(branch: Branch, path: str | PathLike[str]) -> None:
+def write_report(branch: Branch, path: str | PathLike[str], units: str = "scaled") -> None:
     """See :func:`femmembrane.views.report.write_report`."""
     from ..views.report import write_report
 
-    write_report(branch, path)
+    write_report(branch, path, units=units)
 
 
 def branch_html(branch: Branch) -> str:

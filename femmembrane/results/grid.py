@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..origin import package_version
-from ..quantities import PLACES, quantity
+from ..quantities import PLACES, Converter, in_si, quantity
 from .netcdf import read_dataset, reason, write_dataset
 
 if TYPE_CHECKING:
@@ -69,10 +69,13 @@ class Row(Protocol):
     def seconds(self) -> float: ...
 
 
-def dataset_of(over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: Mapping[str, str]) -> xarray.Dataset:
+def dataset_of(
+    over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: Mapping[str, str], scales: Converter | None = None
+) -> xarray.Dataset:
     """The rows of a grid, the last key fastest, in the shape of the grid.
 
     Numbers that a scene does not have are NaN, texts empty; series of different lengths are filled up with NaN.
+    With scales that all scenes share, places have their values in SI units as well.
     """
     import xarray
 
@@ -91,6 +94,11 @@ def dataset_of(over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: 
         )
         about = {"long_name": _meaning(name), "units": "1"}
         variables[name] = (*dims, dim) if series else dims, data.reshape(shape + data.shape[1:]), about
+        if scales is not None and (of := place_of_variable(name)[0]):
+            tag, kind, (along, values, _) = name.removesuffix(of), quantity(of).si, variables[name]
+            known = quantity(in_si(of))
+            about = {"long_name": f"{known.meaning} {_FAMILIES[tag][2]}", "units": known.unit}
+            variables[f"{tag}{in_si(of)}"] = along, scales.to_si(kind, values), about
     variables["status"] = dims, _text([r.status for r in rows]).reshape(shape), {"long_name": "how the computation of the scene ended"}
     variables["message"] = dims, _text([r.message for r in rows]).reshape(shape), {"long_name": "the reason, or what was done"}
     has = np.array([bool(r.values) for r in rows]).reshape(shape)

@@ -41,7 +41,9 @@ def run_files() -> tuple[str, ...]:
     return ("branch.csv", "special_points.csv", *tables, RECORD, "branch.nc", "pressure-volume.png", *pictures, SURFACES, last)
 
 
-def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None) -> list[Path]:
+def write_run(
+    branch: Branch, directory: str | os.PathLike[str], *, command: str | Sequence[str] | None = None, units: str = "scaled"
+) -> list[Path]:
     """Write everything that is known of a branch to a folder.
 
     ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), the files of the analyses that the scene
@@ -56,6 +58,8 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
         Made when it does not exist.
     command : str or sequence of str, optional
         The command that asked for the run, for ``run.json``.
+    units : {"scaled", "si"}
+        Of ``pressure-volume.png``.
 
     Returns
     -------
@@ -72,7 +76,7 @@ def write_run(branch: Branch, directory: str | os.PathLike[str], *, command: str
     folder = _writable(Path(directory))
     names = run_files()
     refuse_obstacles(folder, names, (SURFACES_FOLDER,))
-    writers = _writers(branch, command)
+    writers = _writers(branch, command, units)
     for stale in {*names} - (writers.keys() - {RECORD}):
         (folder / stale).unlink(missing_ok=True)
     if SURFACES not in writers:
@@ -175,7 +179,7 @@ _FACTS = {
 _FIRST = "branch.nc"
 
 
-def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Callable[[Path], object]]:
+def _writers(branch: Branch, command: str | Sequence[str] | None, units: str) -> dict[str, Callable[[Path], object]]:
     """How each file that this branch gets is written."""
     writers: dict[str, Callable[[Path], object]] = {"branch.csv": partial(write_csv, branch)}
     if branch.special_points is not None:
@@ -183,7 +187,7 @@ def _writers(branch: Branch, command: str | Sequence[str] | None) -> dict[str, C
     analyses = asked(branch.scene)
     writers |= {name: partial(write, branch) for analysis in analyses for name, write in analysis.tables.items()}
     if len(branch):
-        writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(door.plot_pressure_volume, branch)}
+        writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(door.plot_pressure_volume, branch, units=units)}
         writers[SURFACES] = partial(door.write_vtk, branch)
         writers |= {name: partial(draw, branch) for analysis in analyses for name, draw in analysis.pictures.items()}
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,13 @@ from .store import scene_from_text
 if TYPE_CHECKING:
     import xarray
 
+    from ..physics.scales import Scales
     from ..scene import Scene
+
+
+def common_scales(scene: Scene, over: Iterable[str]) -> Scales | None:
+    """The scales of all scenes that differ in some keys; None where they have none, or where these differ."""
+    return None if any(key.split(".")[0] == "scales" for key in over) else scene.scales
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +95,12 @@ class Sweep:
             raise InputError("path", str(path), f"a sweep written by femmembrane is needed ({error})") from None
         return cls(scene, over, dataset.attrs["quantity"], dataset)
 
-    def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None) -> Any:
+    @property
+    def scales(self) -> Scales | None:
+        """The scales that all scenes have; None where they have none, or where these differ."""
+        return common_scales(self.scene, self.over)
+
+    def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None, units: str = "scaled") -> Any:
         """Maps over two keys, or curves over one, as a Matplotlib figure.
 
         Parameters
@@ -99,13 +110,15 @@ class Sweep:
         show : sequence of str, optional
             Variables of the data set. A variable with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
             most telling variables of the quantity.
+        units : {"scaled", "si"}
+            Of volumes, pressures and heights: those of the package, or SI units by the scales.
 
         Raises
         ------
         InputError
             For an unknown variable, for three keys or more, or a file that cannot be written.
         """
-        return door.plot_grid(self, path, show)
+        return door.plot_grid(self, path, show, units)
 
 
 @dataclass(frozen=True)

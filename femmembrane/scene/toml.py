@@ -3,6 +3,7 @@
 A scene file has one table for each part; the keys of a table are the arguments of a class, or attributes of :class:`.Scene`::
 
     title                        Scene.title
+    units                        "si" or "scaled": what numbers without a unit are (:mod:`.laboratory`, which comes before this)
     [material]  model, ...       a class of MATERIALS and its arguments
                 name             or a real material by name, :func:`~femmembrane.material`
     [membrane]                   attributes of Scene, listed in SCENE_KEYS
@@ -32,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks import choice, sequence
+from ..checks import choice, number, sequence
 from ..discretization.curve import Curve
 from ..discretization.meridian import Disc, Meridian
 from ..discretization.mesh_files import read_meridian
@@ -107,6 +108,7 @@ MAX_BYTES = 2**25
 _OTHERWISE = {
     (Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows",
     (Magnet, "strength"): "give it, or the remanence in T beside a table [scales]",
+    (Scales, "shear_modulus"): "give it in Pa, or the moduli of [material] in Pa, from which it follows",
 }
 #: keys of a table from which an argument of its class follows
 _INSTEAD: dict[Any, tuple[str, ...]] = {Magnet: ("remanence",)}
@@ -168,14 +170,14 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """
     if not isinstance(data, Mapping):
         raise InputError("scene", data, "a mapping of the tables of a scene file is allowed")
-    _refuse_unknown("", data, ("title", *_known_keys()))
+    _refuse_unknown("", data, ("title", "units", *_known_keys()))
     tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name not in ("source", "load")}
     arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
     for table in SCENE_KEYS.keys() - {"mesh"}:
         _refuse_unknown(table, tables[table], SCENE_KEYS[table])
     scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
     return dict(
-        material=_build_material(tables["material"]),
+        material=material_of(tables["material"]),
         sources=_build_list("source", SOURCES, data.get("source", ()), scales),
         loads=_build_list("load", LOADS, data.get("load", ())),
         mesh=_build_mesh(tables["mesh"], folder),
@@ -234,7 +236,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model", "name"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind", "remanence"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
-    keys["mesh"] |= {"shape", "file", *FILE_KEYS} | arguments(*SHAPES.values())
+    keys["mesh"] |= {"shape", "file", "unit", *FILE_KEYS} | arguments(*SHAPES.values())
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
 
 
@@ -271,7 +273,8 @@ def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: 
     return _build(path, registry[table[selector]], table, (selector, *beside))
 
 
-def _build_material(table: Mapping[str, Any]) -> Any:
+def material_of(table: Mapping[str, Any]) -> Any:
+    """The material that a table [material] describes."""
     if "name" not in table:
         return _build_one_of("material", "model", MATERIALS, table)
     for key in table.keys() - {"name"}:
@@ -288,10 +291,14 @@ def _build_mesh(table: Mapping[str, Any], folder: Path) -> Meridian:
     if "file" not in table:
         mesh: Meridian = _build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, beside=SCENE_KEYS["mesh"])
         return mesh
-    _refuse_unknown("mesh", table, ("file", *FILE_KEYS, *SCENE_KEYS["mesh"]))
+    _refuse_unknown("mesh", table, ("file", "unit", *FILE_KEYS, *SCENE_KEYS["mesh"]))
     if not isinstance(table["file"], str):
         raise InputError("mesh.file", table["file"], "the path of a mesh file is allowed, from the folder of the scene")
-    return read_meridian(folder / table["file"], **{name: table[name] for name in FILE_KEYS if name in table})
+    curve = read_meridian(folder / table["file"], **{name: table[name] for name in FILE_KEYS if name in table})
+    unit = number(
+        "mesh.unit", table.get("unit", 1), 'a unit of length such as "mm", or the length of the unit over R0, is allowed', above=0
+    )
+    return curve if unit == 1 else dataclasses.replace(curve, points=tuple((unit * r, unit * z) for r, z in curve.points))
 
 
 def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Scales | None = None) -> tuple[Any, ...]:

@@ -298,7 +298,9 @@ class Scene:
         InputError
             For an unknown table or key (with the nearest valid name), a missing one, or a value that cannot be used.
         """
-        return cls(**scene_arguments(data, Path(folder)))
+        from .laboratory import scaled
+
+        return cls(**scene_arguments(scaled(data), Path(folder)))
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> Self:

@@ -23,7 +23,7 @@ from ..memory import require
 from ..results.finished_scenes import FinishedScenes
 from ..results.grid import DIMENSIONS, dataset_of
 from ..results.store import scene_text
-from ..results.sweep import Plan, Sweep
+from ..results.sweep import Plan, Sweep, common_scales
 from ..scene import Scene
 from ..scene.keys import MAX_SCENES, set_key
 from . import parallel
@@ -127,7 +127,9 @@ def sweep(
         "over": json.dumps(list(grid.over)),
         "options": json.dumps(asdict(grid.options)),
     }
-    return Sweep(scene, grid.over, quantity, dataset_of(grid.over, [rows[key] for key in grid.keys], facts))
+    return Sweep(
+        scene, grid.over, quantity, dataset_of(grid.over, [rows[key] for key in grid.keys], facts, common_scales(scene, grid.over))
+    )
 
 
 def plan_sweep(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Status, unknown_name
-from ..quantities import PLACES, axis_label
+from ..quantities import PLACES, Units, axis_label
 from .figures import ILL_POSED_WORD, PLAIN, RED, Style, style_of
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
@@ -42,6 +42,7 @@ def draw_branch(
     *,
     across: str = "volume",
     up: str = "pressure",
+    units: str = "scaled",
     style: Style | None = None,
     dots: bool | None = None,
     special_points: bool = True,
@@ -59,6 +60,8 @@ def draw_branch(
     branch : Branch
     across, up : {"volume", "pressure", "center_height"}
         What the axes show.
+    units : {"scaled", "si"}
+        In units of the package, or in SI units such as ml and kPa, by the scales of the scene; numbers on the axes are those of the label.
     style : Style, optional
         One style for the whole line, in place of the verdicts'.
     dots : bool, optional
@@ -69,16 +72,18 @@ def draw_branch(
     Raises
     ------
     InputError
-        For an unknown quantity.
+        For an unknown quantity or word, and for SI units of a scene without scales.
     """
     for key, name in (("across", across), ("up", up)):
         if name not in PLACES:
             raise unknown_name(key, name, PLACES)
-    axes.set_xlabel(axis_label(across))
-    axes.set_ylabel(axis_label(up))
+    of_scene = Units.of(units, branch.scene.scales)
+    axes.set_xlabel(axis_label(across, of_scene))
+    axes.set_ylabel(axis_label(up, of_scene))
+    shown = _Shown((across, up), np.array([of_scene.factor(across), of_scene.factor(up)]))
     axes.grid(color="0.9", linewidth=0.6)
-    points = _coordinates(branch, (across, up))
-    gaps = _gaps(branch, (across, up))
+    points = shown.at(branch)
+    gaps = _gaps(branch, shown)
     controls = () if style else branch.scene.analysis.stability
     words = _words(branch, controls)
     drawn = style or PLAIN
@@ -90,11 +95,23 @@ def draw_branch(
         _draw_azimuthal(axes, branch, points, gaps)
         if branch.scene.analysis.wrinkling:
             _draw_wrinkling(axes, branch, points, gaps)
-    _draw_jumps(axes, branch, (across, up))
+    _draw_jumps(axes, branch, shown)
     if special_points:
-        _draw_special_points(axes, branch, (across, up))
+        _draw_special_points(axes, branch, shown)
     if branch.status is not Status.CONVERGED and len(points):
         axes.plot(*points[-1], "X", color=RED, markeredgecolor="white", markersize=10, zorder=5, label=f"ends here: {branch.status}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What the axes show: two quantities, each times a factor."""
+
+    quantities: tuple[str, str]
+    factors: Array
+
+    def at(self, items: Sequence[Equilibrium | SpecialPoint]) -> Array:
+        """Places in the picture."""
+        return _coordinates(items, self.quantities) * self.factors
 
 
 def _words(branch: Branch, controls: Sequence[str]) -> list[dict[Any, str]]:
@@ -126,7 +143,7 @@ def _changes(point: SpecialPoint) -> tuple[Any, ...] | None:
     return of_kind.get(str(point.kind))
 
 
-def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
+def _gaps(branch: Branch, shown: _Shown) -> list[_Gap]:
     """What lies between each pair of neighbours.
 
     A special point lies between the two neighbours for which the way over it is the smallest detour, in volume, pressure and pole height
@@ -137,7 +154,7 @@ def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
     a, b = points[:-1] / scale, points[1:] / scale
     direct = np.linalg.norm(b - a, axis=1)
     inside: list[list[tuple[float, SpecialPoint, Array]]] = [[] for _ in direct]
-    places, pictured = _coordinates(special, PLACES) / scale, _coordinates(special, quantities)
+    places, pictured = _coordinates(special, PLACES) / scale, shown.at(special)
     for item, place, drawn in zip(special, places, pictured, strict=True):
         detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
         if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
@@ -146,7 +163,7 @@ def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
     for jump in branch.jumps:
         for k, (before, landing) in enumerate(pairwise(branch)):
             if landing is jump.landing:  # by way of the fold where the branch turned back
-                ordered[k] = [(_SNAP, _coordinates([jump.limit or before], quantities)[0])]
+                ordered[k] = [(_SNAP, shown.at([jump.limit or before])[0])]
     return ordered
 
 
@@ -218,24 +235,24 @@ def _draw_wrinkling(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_G
             draw_along(axes, line, kind, zone_label(branch.scene, kind), BRANCH_WIDTH)
 
 
-def _draw_jumps(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
+def _draw_jumps(axes: Axes, branch: Branch, shown: _Shown) -> None:
     """An arrow for each snap, from the fold where the branch turned back, or from the equilibrium before."""
     before = {id(landing): previous for previous, landing in pairwise(branch)}
     arrow = {"arrowstyle": "-|>", "color": RED, "linewidth": 1.6, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0}
     for jump in branch.jumps:
         if id(jump.landing) in before:
-            tail, tip = _coordinates([jump.limit or before[id(jump.landing)], jump.landing], quantities)
+            tail, tip = shown.at([jump.limit or before[id(jump.landing)], jump.landing])
             axes.annotate("", xy=tip, xytext=tail, arrowprops=arrow, zorder=4)
             axes.plot([], [], color=RED, linewidth=1.6, label=new_label(axes, "snap"))
 
 
-def _draw_special_points(axes: Axes, branch: Branch, quantities: Sequence[str]) -> None:
+def _draw_special_points(axes: Axes, branch: Branch, shown: _Shown) -> None:
     points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit)]
     for kind in dict.fromkeys(str(p.kind) for p in points):
         marker, named = MARKERS.get(kind, ("X", kind.replace("_", " ")))
-        places = _coordinates([p for p in points if str(p.kind) == kind], quantities)
+        places = shown.at([p for p in points if str(p.kind) == kind])
         look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
         axes.plot(*places.T, marker, label=new_label(axes, named), zorder=4, **look)
-    for point, place in zip(points, _coordinates(points, quantities), strict=True):
+    for point, place in zip(points, shown.at(points), strict=True):
         if point.azimuthal:
             axes.annotate(f"n = {point.azimuthal}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, zorder=5)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..quantities import axis_label, key_label
+from ..quantities import Units, axis_label, key_label
 from ..results.grid import DIMENSIONS, place_of_variable
 from .backend import title_text
 from .figures import new_figure, save_figure
@@ -43,21 +43,22 @@ _COUNTS = ("limit_points", "volume_folds", "equilibria", "stable_equilibria", "a
 _SHADES = 9
 
 
-def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None) -> Figure:
+def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Figure:
     """One panel for each variable: a map over two keys, or a curve over one.
 
     Raises
     ------
     InputError
-        For an unknown variable, three keys or more, or a file that cannot be written.
+        For an unknown variable, three keys or more, a file that cannot be written, or SI units of scenes without scales of their own.
     """
+    chosen = Units.of(units, sweep.scales)
     dims = tuple(sweep.over)
     if len(dims) > 2:
         allowed = "maps have two keys, curves one; choose values of the others by to_xarray().sel(...) for a plot of your own"
         raise InputError("over", list(dims), allowed)
     data = sweep.to_xarray()
     names = list(_available(data, SHOWN[sweep.quantity]) if show is None else show)
-    panels = [(name, _values(data, name, dims)) for name in names]
+    panels = [(name, _factor(name, chosen) * _values(data, name, dims)) for name in names]
     if not panels:
         raise InputError("sweep", sweep.quantity, "no scene has a result to show; status and message say why")
     draw = _draw_map if len(dims) == 2 else _draw_curve
@@ -65,7 +66,7 @@ def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Seque
     handles: dict[str, Any] = {}
     hatches: dict[str, str] = {}
     for axes, (name, values) in zip(np.atleast_1d(row), panels, strict=True):
-        handles |= draw(axes, data, dims, name, values, hatches)
+        handles |= draw(axes, data, dims, name, _label(name, chosen), values, hatches)
     if handles:
         figure.legend(
             list(handles.values()), list(handles), loc="outside lower center", frameon=False, fontsize=8.5, ncols=min(3, len(handles))
@@ -99,11 +100,15 @@ def _values(data: Any, name: str, dims: tuple[str, ...]) -> Array:
     return array.values[..., int(place)]
 
 
-def _label(name: str) -> str:
+def _factor(name: str, units: Units) -> float:
+    return units.factor(place_of_variable(name.partition(".")[0])[0])
+
+
+def _label(name: str, units: Units) -> str:
     """What a panel shows, with its unit."""
     variable, _, place = name.partition(".")
     quantity, what = place_of_variable(variable)
-    return f"{what}{f' {int(place) + 1}' if place else ''}: {axis_label(quantity)}" if quantity else axis_label(variable)
+    return f"{what}{f' {int(place) + 1}' if place else ''}: {axis_label(quantity, units)}" if quantity else axis_label(variable)
 
 
 def _reasons(data: Any, values: Array) -> Array:
@@ -136,7 +141,9 @@ def _edges(centers: Array) -> Array:
     return np.concatenate([[2 * centers[0] - middle[0]], middle, [2 * centers[-1] - middle[-1]]])
 
 
-def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: Array, hatches: dict[str, str]) -> dict[str, Any]:
+def _draw_map(
+    axes: Axes, data: Any, dims: tuple[str, ...], name: str, label: str, values: Array, hatches: dict[str, str]
+) -> dict[str, Any]:
     x, y = (_positions(data, key)[0] for key in dims)
     along, up = np.argsort(x), np.argsort(y)
     x_edges, y_edges = _edges(x[along]), _edges(y[up])
@@ -149,7 +156,7 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
     for key, positions, axis in ((dims[0], x, axes.xaxis), (dims[1], y, axes.yaxis)):
         if not _positions(data, key)[1]:
             axis.set_ticks(positions, [title_text(str(v)) for v in data[key].values], parse_math=False)
-    axes.set_title(_label(name), fontsize=10)
+    axes.set_title(label, fontsize=10)
     return _hatch(axes, x_edges, y_edges, reasons, grid, hatches)
 
 
@@ -195,14 +202,16 @@ def _hatch(axes: Axes, x_edges: Array, y_edges: Array, reasons: Array, grid: Arr
     return handles
 
 
-def _draw_curve(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: Array, hatches: dict[str, str]) -> dict[str, Any]:
+def _draw_curve(
+    axes: Axes, data: Any, dims: tuple[str, ...], name: str, label: str, values: Array, hatches: dict[str, str]
+) -> dict[str, Any]:
     """A curve over one key; scenes without a plain value are marked at the foot, or on the curve."""
     (key,) = dims
     x, numbers = _positions(data, key)
     order = np.argsort(x)
     x, values, reasons = x[order], values[order], _reasons(data, values)[order]
     axes.plot(x, values, "-", color="#0072b2", linewidth=1.6, marker=".", markersize=5)
-    axes.set(xlabel=key_label(key), ylabel=_label(name))
+    axes.set(xlabel=key_label(key), ylabel=label)
     axes.grid(color="0.92", linewidth=0.6)
     if not numbers:
         axes.set_xticks(x, [title_text(str(v)) for v in data[key].values[order]], parse_math=False)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..quantities import axis_label, caption
+from ..quantities import Units, axis_label, caption
 from .branch_lines import MARKERS, draw_branch
 from .figures import (
     BOTH,
@@ -60,7 +60,7 @@ __all__ = [
 ]
 
 
-def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
+def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None, *, units: str = "scaled") -> Figure:
     """Pressure against volume; line styles tell the verdicts that the scene asked for, markers the special points found.
 
     Parameters
@@ -69,20 +69,24 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
         With one or more equilibria.
     path : path, optional
         Picture to write; the suffix chooses the format.
+    units : {"scaled", "si"}
+        In units of the package, or in SI units by the scales of the scene.
 
     Raises
     ------
     InputError
-        For an empty branch or a file that cannot be written.
+        For an empty branch, a file that cannot be written, or SI units of a scene without scales.
     """
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.6), title=branch.scene.title)
-    draw_branch(axes, branch)
+    draw_branch(axes, branch, units=units)
     draw_legend(axes, "among axisymmetric shapes:" if branch.scene.analysis.stability else None)
     return save_figure(figure, path)
 
 
-def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count: int = 6, *, zones: bool | None = None) -> Figure:
+def plot_profiles(
+    branch: Branch, path: str | PathLike[str] | None = None, count: int = 6, *, zones: bool | None = None, units: str = "scaled"
+) -> Figure:
     """Deformed meridians of some equilibria, evenly spread along the branch, with the magnetic sources.
 
     Parameters
@@ -95,6 +99,8 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
         Number of meridians, first and last equilibrium included.
     zones : bool, optional
         Mark the wrinkled parts; by default when the scene asks for wrinkling.
+    units : {"scaled", "si"}
+        In units of the package, or in SI units by the scales of the scene.
 
     Raises
     ------
@@ -105,15 +111,16 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
     if count < 1:
         raise InputError("count", count, "a whole number >= 1 is allowed")
     shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, min(count, len(branch))).round().astype(int))]
+    chosen = Units.of(units, branch.scene.scales)
     figure, axes = new_figure((6.4, 5.6), title=branch.scene.title)
     from matplotlib import colormaps
 
     # lightness falls along the map, so that neighbours differ in grey as well
     colors = colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2)))
     for equilibrium, color in zip(shown, colors, strict=False):
-        named = caption(equilibrium.volume, equilibrium.pressure, ",  ")
-        draw_profile(axes, equilibrium, Style(named, SOLID, color), zones=zones)
-    draw_surroundings(axes, shown)
+        named = caption(equilibrium.volume, equilibrium.pressure, ",  ", chosen)
+        draw_profile(axes, equilibrium, Style(named, SOLID, color), zones=zones, units=chosen)
+    draw_surroundings(axes, shown, chosen)
     axes.set_anchor("W")  # the legend stands on the right
     handles, labels = legend_entries(axes)
     look: dict[str, Any] = {"bbox_to_anchor": (1.01, 0.5), "frameon": False, "fontsize": 9, "handlelength": 3.2}
@@ -121,7 +128,7 @@ def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count
     return save_figure(figure, path)
 
 
-def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
+def plot_zones(branch: Branch, path: str | PathLike[str] | None = None, *, units: str = "scaled") -> Figure:
     """Taut and wrinkled zones: reference radius (of a curved meridian: arc length) against volume, or the step where that is not monotone.
 
     Parameters
@@ -130,28 +137,31 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Figur
         With one or more equilibria; the criterion is its scene's ("total" if that asks for none).
     path : path, optional
         Picture to write; the suffix chooses the format.
+    units : {"scaled", "si"}
+        In units of the package, or in SI units by the scales of the scene.
 
     Raises
     ------
     InputError
-        For an empty branch or a file that cannot be written.
+        For an empty branch, a file that cannot be written, or SI units of a scene without scales.
     """
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.2), title=branch.scene.title)
-    handles = draw_zones(axes, branch)
+    handles = draw_zones(axes, branch, units=units)
     figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
     return save_figure(figure, path)
 
 
-def draw_zones(axes: Axes, branch: Branch) -> list[Any]:
+def draw_zones(axes: Axes, branch: Branch, *, units: str = "scaled") -> list[Any]:
     """The zones of a branch on labelled axes, as in :func:`plot_zones`; handles for a legend."""
-    volume = np.array([equilibrium.volume for equilibrium in branch])
+    chosen = Units.of(units, branch.scene.scales)
+    volume = chosen.factor("volume") * np.array([equilibrium.volume for equilibrium in branch])
     steps = np.diff(volume)
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())
-    handles = fill_zones(axes, branch, volume if monotone else np.arange(volume.size, dtype=float))
-    axes.set_xlabel(axis_label("volume" if monotone else "step"))
+    handles = fill_zones(axes, branch, volume if monotone else np.arange(volume.size, dtype=float), chosen.factor("r"))
+    axes.set_xlabel(axis_label("volume" if monotone else "step", chosen))
     flat = "s" not in branch[0].profile()
-    axes.set_ylabel(axis_label("r" if flat else "s"))
+    axes.set_ylabel(axis_label("r" if flat else "s", chosen))
     axes.margins(0)
     return list(handles)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import Status
 from ..files import replace_file
-from ..quantities import PLACES, axis_label, caption, heading, words
+from ..quantities import PLACES, Units, axis_label, caption, heading_in, words
 from ..results.analyses import asked
 from ..results.analyses.base import Curves, Drawing, Section
 from . import plots
@@ -42,7 +42,7 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5
 _COLORS = ("#0072b2", "#d55e00", "#222222", "#a01040")
 
 
-def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, Any] | None = None) -> None:
+def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, Any] | None = None, *, units: str = "scaled") -> None:
     """Write the page of a branch.
 
     Parameters
@@ -53,20 +53,22 @@ def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, 
         HTML file to write.
     facts : mapping, optional
         Of the run, as in its ``run.json``: ``command``, ``versions``, ``platform``, ``processors``, ``written``.
+    units : {"scaled", "si"}
+        Of figures, ranges and special points: those of the package, or SI units by the scales of the scene.
 
     Raises
     ------
     InputError
-        For a file that cannot be written.
+        For a file that cannot be written, and for SI units of a scene without scales.
     """
-    page = report(branch, facts)
+    page = report(branch, facts, units)
     with replace_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8", errors="backslashreplace")  # the command may hold names that are no UTF-8
 
 
-def report(branch: Branch, facts: Mapping[str, Any] | None = None) -> str:
+def report(branch: Branch, facts: Mapping[str, Any] | None = None, units: str = "scaled") -> str:
     """The page as text; see :func:`write_report`."""
-    page = _Page(branch, facts or {})
+    page = _Page(branch, facts or {}, units, Units.of(units, branch.scene.scales))
     sections = [(name, body) for name, body in page.sections() if body]
     title = branch.scene.title or "Inflated membrane"
     links = "".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name, _ in sections)
@@ -107,6 +109,8 @@ def _anchor(name: str) -> str:
 class _Page:
     branch: Branch
     facts: Mapping[str, Any]
+    system: str
+    units: Units
     colors: set[str] = field(default_factory=set)
     figures: int = 0
 
@@ -132,8 +136,8 @@ class _Page:
         tiles = [("equilibria", str(len(branch)))]
         if len(branch):
             for name in PLACES:
-                values = branch.column(name)
-                tiles.append((axis_label(name), f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
+                values = self.units.factor(name) * branch.column(name)
+                tiles.append((axis_label(name, self.units), f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
             tiles.append(("largest residual", f"{branch.column('residual').max():.1e}".replace("-", "−")))  # noqa: RUF001
         shown = "".join(f'<div class="tile"><b>{value}</b><span>{escape(name)}</span></div>' for name, value in tiles)
         return f'{state}{message}<div class="tiles">{shown}</div>'
@@ -149,7 +153,7 @@ class _Page:
         figures = []
         for across in ("volume", "center_height"):
             figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
-            plots.draw_branch(axes, self.branch, across=across)
+            plots.draw_branch(axes, self.branch, across=across, units=self.system)
             _legend_below(figure, axes)
             figures.append(self._figure(figure, f"Pressure against {words(across)}"))
         return _beside(*figures) + self._special_points() + self._jumps()
@@ -164,26 +168,29 @@ class _Page:
         rows = [
             [
                 names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
-                *(getattr(p, name) for name in PLACES),
+                *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
-        return table(["special point", *map(heading, PLACES), "relative error"], rows)
+        return table(["special point", *(heading_in(name, self.units) for name in PLACES), "relative error"], rows)
 
     def _jumps(self) -> str:
-        rows = []
+        names, rows = ("volume", "pressure"), []
         for jump in self.branch.jumps:
-            start = (jump.limit.volume, jump.limit.pressure) if jump.limit else (np.nan, np.nan)
-            rows.append([jump.index, *start, jump.landing.volume, jump.landing.pressure])
-        return table(["snap to step", "from V", "from P", "to V", "to P"], rows) if rows else ""
+            ends = [[self.units.factor(q) * getattr(end, q, np.nan) for q in names] for end in (jump.limit, jump.landing)]
+            rows.append([jump.index, *ends[0], *ends[1]])
+        header = [f"{way} {heading_in(name, self.units)}" for way in ("from", "to") for name in names]
+        return table(["snap to step", *header], rows) if rows else ""
 
     def _shape(self) -> str:
         last, at = self.branch[-1], f"at step {len(self.branch) - 1}, the last"
         stresses = ("mechanical_stress_1", "mechanical_stress_2", *_totals(self.branch))
-        meridians = self._figure(_profiles(self.branch), "Deformed meridians of some equilibria with the sources")
-        along = self._figure(_along(last, ("stretch_1", "stretch_2")), "Stretches", f"Stretches {at}")
-        along += self._figure(_along(last, stresses), "Stresses", f"Cauchy stresses over μ {at}")
+        meridians = self._figure(_profiles(self.branch, self.units), "Deformed meridians of some equilibria with the sources")
+        along = self._figure(_along(last, ("stretch_1", "stretch_2"), self.units), "Stretches", f"Stretches {at}")
+        unit = self.units.unit(stresses[0])
+        named = f"Cauchy stresses in {unit}" if unit else "Cauchy stresses over μ"
+        along += self._figure(_along(last, stresses, self.units), "Stresses", f"{named} {at}")
         return _beside(meridians, f"<div>{along}</div>")
 
     def _analysis(self, section: Section) -> str:
@@ -255,7 +262,7 @@ def _legend_below(figure: Figure, axes: Any, columns: int = 1) -> None:
         figure.legend(handles, labels, loc="outside lower left", **look)
 
 
-def _profiles(branch: Branch) -> Figure:
+def _profiles(branch: Branch, units: Units) -> Figure:
     load()
     from matplotlib import colormaps
 
@@ -263,9 +270,9 @@ def _profiles(branch: Branch) -> Figure:
     box = Box.of([equilibrium.profile() for equilibrium in shown])
     figure, axes = plots.new_figure((_WIDTH, 1.9 + _HEIGHT * min(0.85, (box.high - box.low) / (2 * box.radius))))  # round stays round
     for equilibrium, color in zip(shown, colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2))), strict=False):
-        named = caption(equilibrium.volume, equilibrium.pressure, ",  ")
-        plots.draw_profile(axes, equilibrium, plots.Style(named, "-", color))
-    plots.draw_surroundings(axes, shown)
+        named = caption(equilibrium.volume, equilibrium.pressure, ",  ", units)
+        plots.draw_profile(axes, equilibrium, plots.Style(named, "-", color), units=units)
+    plots.draw_surroundings(axes, shown, units)
     _legend_below(figure, axes)
     return figure
 
@@ -275,15 +282,16 @@ def _totals(branch: Branch) -> tuple[str, ...]:
     return ("total_stress_1", "total_stress_2") if branch.scene.sources else ()
 
 
-def _along(equilibrium: Equilibrium, names: tuple[str, ...]) -> Figure:
+def _along(equilibrium: Equilibrium, names: tuple[str, ...], units: Units) -> Figure:
     """Quantities of the profile along the arc of the reference meridian."""
     profile = smooth_profile(equilibrium, points=201)
     figure, axes = plots.new_figure((_WIDTH, _HEIGHT))
     for name, dashes, color in zip(names, _DASHES, _COLORS, strict=False):
         way = {"1": "along the meridian", "2": "around the axis"}[name[-1]]
         kind = name[:-2].replace("_", " ")
-        axes.plot(profile.get("s", profile["r"]), profile[name], linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
-    axes.set_xlabel(axis_label("s" if "s" in profile else "r"))
+        place, value = units.factor("s") * profile.get("s", profile["r"]), units.factor(name) * profile[name]
+        axes.plot(place, value, linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
+    axes.set_xlabel(axis_label("s" if "s" in profile else "r", units))
     axes.grid(color="0.9", linewidth=0.6)
     if profile[names[0]].min() < 0 or min(profile[name].min() for name in names) < 0:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)

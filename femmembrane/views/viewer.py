@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import replace_file
-from ..quantities import caption, words
+from ..quantities import SCALED, Units, caption, in_si, words
 from ..results.analyses import remarks
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
@@ -44,6 +44,7 @@ def view(
     screenshot: str | PathLike[str] | None = None,
     movie: str | PathLike[str] | None = None,
     size: tuple[int, int] | None = None,
+    units: str = "scaled",
 ) -> None:
     """Show the membrane in space: in a window, or in files and without a display if files are asked for.
 
@@ -64,18 +65,22 @@ def view(
         GIF or MP4 file to write: all steps (90 of them, where there are more), or one period of the mode.
     size : tuple of int
         Width and height in pixels. Default: (1200, 900), for a movie (720, 540).
+    units : {"scaled", "si"}
+        Of the numbers beside the membrane and of stresses: those of the package, or SI units by the scales of the scene.
 
     Raises
     ------
     InputError
-        For an empty branch, an unknown colour, a step that does not exist, a file that cannot be written, MP4 without a writer, and a
-        window without a display.
+        For an empty branch, an unknown colour, SI units of a scene without scales, a step that does not exist, a file that cannot be
+        written, MP4 without a writer, and a window without a display.
     SolveError
         For a mode of a state that has no natural modes.
     """
     branch = list(shown) if isinstance(shown, Sequence) else [shown]
     if not branch:
         raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
+    chosen_units = Units.of(units, branch[0].scene.scales)
+    color = in_si(color) if chosen_units.unit(color) else color
     check_quantity(color, branch[0].scene, "color")
     place = place_of(step, len(branch))
     if movie is not None:
@@ -87,22 +92,22 @@ def view(
         return
     if screenshot is not None:
         with replace_file(_png(screenshot)) as temporary, new_plotter(size or SIZE) as plotter:
-            _Stage(plotter, [branch[place]], [place], len(branch), color).draw(0)
+            _Stage(plotter, [branch[place]], [place], len(branch), color, chosen_units).draw(0)
             plotter.screenshot(str(temporary))
     if movie is not None:
         chosen = np.unique(np.linspace(0, len(branch) - 1, min(len(branch), _MOST)).round().astype(int)).tolist()
         with new_plotter(size or MOVIE_SIZE) as plotter:
-            stage = _Stage(plotter, [branch[k] for k in chosen], chosen, len(branch), color)
+            stage = _Stage(plotter, [branch[k] for k in chosen], chosen, len(branch), color, chosen_units)
             write_movie(_frames(stage), movie, rate=_RATE, hold=_HOLD)
     if screenshot is None and movie is None:
         with new_plotter(size or SIZE, off_screen=False) as plotter:
-            open_steps(plotter, branch, color, place)
+            open_steps(plotter, branch, color, place, chosen_units)
             plotter.show(title=branch[0].scene.title or "femmembrane")
 
 
-def open_steps(plotter: pyvista.Plotter, branch: Sequence[Equilibrium], color: str, place: int) -> None:
+def open_steps(plotter: pyvista.Plotter, branch: Sequence[Equilibrium], color: str, place: int, units: Units = SCALED) -> None:
     """Fill a window: the membrane at a step and, for more than one, the slider."""
-    stage = _Stage(plotter, branch, range(len(branch)), len(branch), color)
+    stage = _Stage(plotter, branch, range(len(branch)), len(branch), color, units)
     stage.draw(place)
     if len(branch) > 1:
         plotter.add_slider_widget(
@@ -128,6 +133,7 @@ class _Stage:
     numbers: Sequence[int]
     total: int
     color: str
+    units: Units = SCALED
 
     def __post_init__(self) -> None:
         self.surfaces = [Surface.of(equilibrium, self.color, sectors=96) for equilibrium in self.branch]
@@ -140,7 +146,7 @@ class _Stage:
 
     def draw(self, index: int) -> None:
         draw_surface(self.plotter, self.surfaces[index], self.limits, self.extent)
-        write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total))
+        write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total, self.units))
 
 
 def _frames(stage: _Stage) -> Iterator[Frame]:
@@ -160,9 +166,9 @@ def write_caption(plotter: pyvista.Plotter, text: str) -> None:
     plotter.add_text(text, position=(0.03 * width, 0.9 * height), font_size=11 * height / 720, color="black", name="caption", render=False)
 
 
-def _caption(equilibrium: Equilibrium, number: int, total: int) -> str:
-    height = f"{words('center_height')} {equilibrium.center_height:.4g}"
-    numbers = f"{caption(equilibrium.volume, equilibrium.pressure, '   ')}   {height}"
+def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units = SCALED) -> str:
+    height = f"{words('center_height')} {units.factor('center_height') * equilibrium.center_height:.4g} {units.unit('center_height')}"
+    numbers = f"{caption(equilibrium.volume, equilibrium.pressure, '   ', units)}   {height.rstrip()}"
     answers = [remark.caption for remark in remarks(equilibrium) if remark.caption]
     step = f"step {number}/{total - 1}   " if total > 1 else ""
     return "\n".join(line for line in (step + numbers, ", ".join(answers)) if line)

@@ -100,12 +100,12 @@ def draw_along(axes: Axes, line: Array, kind: str, label: str, width: float) -> 
     axes.plot(*line.T, color=pattern.ink, linewidth=width, path_effects=effects, label=new_label(axes, label), **look)
 
 
-def draw_meridian_zones(axes: Axes, equilibrium: Equilibrium) -> None:
-    """The patterns of the wrinkled zones along both halves of a deformed meridian."""
+def draw_meridian_zones(axes: Axes, equilibrium: Equilibrium, length: float = 1.0) -> None:
+    """The patterns of the wrinkled zones along both halves of a deformed meridian, drawn so many times its size."""
     wrinkled = [zone for zone in equilibrium.zones() if zone.kind != "taut"]
     for zone in sorted(wrinkled, key=lambda zone: list(PATTERNS).index(zone.kind)):  # where bands run into each other, the worst on top
         profile = equilibrium.profile(np.linspace(*zone.s, _POINTS))
-        half = np.stack([profile["rho"], profile["eta"]], axis=1)
+        half = length * np.stack([profile["rho"], profile["eta"]], axis=1)
         mirrored = half * (-1, 1)
         for line in [np.concatenate([mirrored[::-1], half])] if zone.rho[0] == 0 else [half, mirrored]:
             draw_along(axes, line, zone.kind, zone_label(equilibrium.scene, zone.kind), MERIDIAN_WIDTH)
@@ -116,7 +116,7 @@ def shown_kinds(zones: Zones) -> tuple[str, ...]:
     return ("double",) if "double" in zones.kinds else tuple(kind for kind in ("radial", "circumferential") if kind in zones.kinds)
 
 
-def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
+def fill_zones(axes: Axes, branch: Branch, across: Array, length: float = 1.0) -> list[Patch]:
     """The zones of a branch as filled regions, the parameter of the meridian (of a flat one: the reference radius) upwards.
 
     Borders go straight from one equilibrium to the next. Where the kinds of zones change, states between are interpolated; a snap has no
@@ -126,6 +126,8 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     ----------
     across : ndarray, shape (len(branch),)
         Place of each equilibrium along the other axis, monotone.
+    length : float
+        What R0 is along the meridian.
 
     Returns
     -------
@@ -137,7 +139,7 @@ def fill_zones(axes: Axes, branch: Branch, across: Array) -> list[Patch]:
     along = branch.zones_along()
     places_of_all = np.interp(along.steps, np.arange(len(branch)), across)
     for places, part in _runs(places_of_all, along.zones, along.snaps):
-        edges = np.array([[part[0][0].s[0], *(zone.s[1] for zone in z)] for z in part])
+        edges = length * np.array([[part[0][0].s[0], *(zone.s[1] for zone in z)] for z in part])
         edges = np.concatenate([edges[:1], edges, edges[-1:]])
         for k, kind in enumerate(part[0].kinds):
             look: dict[str, Any] = {"facecolor": PATTERNS[kind].fill, "hatch": PATTERNS[kind].hatch, "edgecolor": "0.3", "lw": 0.0}

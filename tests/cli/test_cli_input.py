@@ -168,7 +168,7 @@ def stand_in(monkeypatch):
     """Replace the verb and the writer; returns the list of branches that were written."""
     written = []
 
-    def write_run(branch, directory, *, command=None):
+    def write_run(branch, directory, *, command=None, units="scaled"):
         assert command == f"femmembrane run {DEMO} --out {directory}"
         written.append(branch)
         return [Path(directory) / "branch.csv"]
@@ -316,7 +316,7 @@ def test_interrupt_before_the_first_equilibrium(stand_in, tmp_path, capsys):
 def test_interrupt_while_writing_waits_for_the_files(stand_in, tmp_path, capsys):
     ended = []
 
-    def write(branch, directory, *, command=None):
+    def write(branch, directory, *, command=None, units="scaled"):
         interrupt()
         ended.append(branch)
         return []
@@ -328,7 +328,7 @@ def test_interrupt_while_writing_waits_for_the_files(stand_in, tmp_path, capsys)
 
 
 def test_disk_full(stand_in, tmp_path, capsys):
-    def write(branch, directory, *, command=None):
+    def write(branch, directory, *, command=None, units="scaled"):
         raise OSError(28, "No space left on device")
 
     stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 2)), write)

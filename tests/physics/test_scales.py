@@ -7,13 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import mu_0
 
 import femmembrane as fm
 from femmembrane import cli
 from femmembrane.errors import InputError
+from femmembrane.physics.scales import SQUARED
 from femmembrane.potential import potential_of
 from femmembrane.quantities import SI_UNITS
 from femmembrane.results import table
@@ -27,7 +28,7 @@ RUBBER = fm.Scales(**TABLE)
 #: with mu0 = 4e-7 pi (true to 1e-9): M = 1e-7 m^2/(4 pi R0^6 mu) = 1e-7 144/(4 pi 6.25e-3) for m = 12 A m^2
 MOMENT, STRENGTH = 12.0, 1.8334649444186344e-4
 MAGNET = fm.Scales(**TABLE, dipole_moment=MOMENT)
-LINEAR = sorted(SI_UNITS.keys() - {"dipole_strength"})
+LINEAR = sorted(SI_UNITS.keys() - set(SQUARED))
 
 
 # --- conversions
@@ -76,6 +77,7 @@ decades = st.tuples(st.floats(1, 10), st.integers(-9, 9)).map(lambda pair: pair[
 any_scales = st.builds(fm.Scales, radius=decades, thickness=decades, shear_modulus=decades)
 
 
+@settings(deadline=None)
 @given(scales=any_scales, quantity=st.sampled_from(LINEAR), value=decades, sign=st.sampled_from([1, -1]))
 def test_there_and_back(scales, quantity, value, sign):
     assert scales.from_si(quantity, scales.to_si(quantity, sign * value)) == pytest.approx(sign * value, rel=1e-15)
@@ -335,6 +337,7 @@ def test_fold_curve_in_the_strength_of_a_moment():
 # --- output in Pa
 
 STRESSES = ("mechanical_stress_1", "mechanical_stress_2", "total_stress_1", "total_stress_2")
+IN_SI = ("volume_m3", "pressure_pa", "center_height_m", "elastic_energy_j", "magnetic_energy_j")
 IN_PA = tuple(f"{name}_pa" for name in STRESSES)
 
 
@@ -377,10 +380,43 @@ def test_column(bare, scaled):
     assert "_pa" not in caught.value.allowed
 
 
+def test_columns_in_si_units_by_hand(scaled):
+    """R0 = 5 cm, R0^3 = 1.25e-4 m^3, mu T R0^2 = 0.05 J, mu T/R0 = 400 Pa."""
+    units = {"volume": ("m3", 1.25e-4), "pressure": ("pa", 400.0), "center_height": ("m", 0.05)}
+    units |= dict.fromkeys(("elastic_energy", "magnetic_energy"), ("j", 0.05))
+    for name, (suffix, unit) in units.items():
+        np.testing.assert_allclose(scaled.column(f"{name}_{suffix}"), unit * scaled.column(name), rtol=1e-14)
+
+
+def test_special_points_in_si_units(tmp_path):
+    scene = disc_scene(elements=8).replace(scales=RUBBER)
+    branch = fm.trace(scene, start=2.0, until={"volume": 30.0})
+    assert len(branch.special_points) == 2
+    table.write_special_points_csv(branch, tmp_path / "points.csv")
+    with (tmp_path / "points.csv").open(encoding="utf-8") as file:
+        row, _ = csv.DictReader(file)
+    for name, column, unit in (
+        ("volume", "volume_m3", 1.25e-4),
+        ("pressure", "pressure_pa", 400),
+        ("center_height", "center_height_m", 0.05),
+    ):
+        assert float(row[column]) == pytest.approx(unit * float(row[name]), rel=1e-13)
+
+
+def test_a_printed_branch_has_readable_units(bare, scaled):
+    """Of a membrane of 5 cm: 125 ml, 400 Pa."""
+    head, first = str(scaled).splitlines()[:2]
+    assert head.split()[-10:] == ["V", "in", "ml", "p", "in", "Pa", "pole", "height", "in", "mm"]
+    assert [float(word) for word in first.split()[-3:]] == pytest.approx(
+        [125 * scaled[0].volume, 400 * scaled[0].pressure, 50 * scaled[0].center_height], rel=1e-4
+    )
+    assert "in ml" not in str(bare)
+
+
 def test_table(bare, scaled, tmp_path):
     names = table.columns(bare)
     place = names.index("residual")
-    assert table.columns(scaled) == [*names[:place], "pressure_pa", *names[place:]]
+    assert table.columns(scaled) == [*names[:place], *IN_SI, *names[place:]]
     table.write_csv(scaled, tmp_path / "branch.csv")
     with (tmp_path / "branch.csv").open(encoding="utf-8") as file:
         found = [float(row["pressure_pa"]) for row in csv.DictReader(file)]
@@ -393,7 +429,7 @@ def test_netcdf(bare, scaled, tmp_path):
 
     scaled.save(tmp_path / "branch.nc")
     with xarray.open_dataset(tmp_path / "branch.nc", engine="h5netcdf") as dataset:
-        assert set(dataset.variables) - set(bare.to_xarray().variables) == {"pressure_pa", *IN_PA}
+        assert set(dataset.variables) - set(bare.to_xarray().variables) == {*IN_SI, *IN_PA}
         assert dataset["pressure_pa"].attrs == {"long_name": "pressure p", "units": "Pa"}
         assert dataset["total_stress_1_pa"].attrs == {"long_name": "meridional total stress", "units": "Pa"}
         assert {dataset[name].attrs["units"] for name in IN_PA} == {"Pa"}

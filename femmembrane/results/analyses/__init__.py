@@ -15,7 +15,7 @@ from ...errors import InputError, unknown_name
 from ...quantities import Quantity, heading, quantity, typed
 from .base import EquilibriumAnalysis, PrintedColumn, Remark
 from .error_estimates import ErrorEstimates
-from .pascals import Pascals
+from .si_columns import SIColumns
 from .verdicts import Verdicts
 from .wrinkled_zones import WrinkledZones
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _VERDICTS = Verdicts()
 #: those that a scene asks for by keys of their own, in the order of their columns
-ANALYSES: tuple[EquilibriumAnalysis, ...] = (_VERDICTS, Pascals(), WrinkledZones(), ErrorEstimates())
+ANALYSES: tuple[EquilibriumAnalysis, ...] = (_VERDICTS, SIColumns(), WrinkledZones(), ErrorEstimates())
 #: those that a scene asks for by name, in ``analysis.extra``
 EXTRA: dict[str, EquilibriumAnalysis] = {}
 

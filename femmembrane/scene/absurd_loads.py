@@ -1,0 +1,73 @@
+"""A remark on loads that no membrane of this size and stiffness holds: most often they were meant in other units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..quantities import heading, readable
+from .run import Run
+
+if TYPE_CHECKING:
+    from .value import Scene
+
+#: a load is remarkable from so many times what the sheet holds: a pressure of mu T over its size, a stretch in all directions
+BEYOND = 100.0
+#: what loads are compared with
+_LIMIT = {
+    "pressure": "the modulus times the thickness over the size of the membrane",
+    "volume": "the size of the membrane, in all directions",
+    "center_height": "the size of the membrane",
+}
+
+
+def remarks_on_loads(scene: Scene) -> tuple[str, ...]:
+    """What is remarkable about the loads that a scene asks for, one remark at most.
+
+    Pressures are compared with mu T over the size of the membrane, where it is thickest and stiffest; volumes and heights with the membrane
+    blown up to 100 times its size.
+    """
+    if scene.run is None or scene.open:
+        return ()
+    size = _size(scene)
+    limits = {"pressure": BEYOND * _stiffness(scene) / size, "volume": BEYOND**3 * size**3, "center_height": BEYOND * size}
+    for key, quantity, load in _loads(scene.run):
+        if abs(load) > limits.get(quantity, np.inf):
+            return (_remark(scene, key, quantity, load),)
+    return ()
+
+
+def _loads(run: Run) -> Iterator[tuple[str, str, float]]:
+    """Key, quantity and value of the loads at the ends of a run."""
+    quantity = run.quantity or ("volume" if run.control == "arc-length" else "")
+    for key in ("start", "stop"):
+        if (load := getattr(run, key)) is not None:
+            yield key, quantity, load
+    if run.values is not None:
+        yield "values", quantity, max(run.values, key=abs)
+    yield from (("until", name, load) for name, load in (run.until or {}).items())
+
+
+def _remark(scene: Scene, key: str, quantity: str, load: float) -> str:
+    value = "" if scene.scales is None else f", that is {readable(quantity, load, scene.scales)}"
+    how = 'units = "si" and [scales]' if scene.scales is None else 'units = "si"'
+    return (
+        f"run.{key} = {load:g} is {heading(quantity)} = {load:g}{value}: over {BEYOND:g} times {_LIMIT[quantity]}; "
+        f"if the number is meant in SI units, give the scene file {how}"
+    )
+
+
+def _size(scene: Scene) -> float:
+    """The larger of radius and half height of the membrane at rest."""
+    R, Z = scene.mesh.position(scene.mesh.breakpoints())
+    return float(max(np.max(R), np.ptp(Z) / 2))
+
+
+def _stiffness(scene: Scene) -> float:
+    """Thickness times modulus, over those of the scales, where it is largest."""
+    s = scene.mesh.breakpoints()
+    R, Z = scene.mesh.position(s)
+    factors = [factor.at(R, Z, s) for factor in (scene.thickness, scene.modulus) if factor is not None]
+    return float(np.max(np.prod(factors, axis=0))) if factors else 1.0

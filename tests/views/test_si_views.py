@@ -1,0 +1,100 @@
+"""Pictures and pages in SI units: numbers are those of the labels, and without scales nothing is offered."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+
+import femmembrane as fm
+from femmembrane.errors import InputError
+from femmembrane.quantities import SCALED, Units, axis_label, caption, heading_in
+from femmembrane.views import plots
+from femmembrane.views.report import report
+from tests.cases import disc_scene
+
+#: R0 = 2 cm, T = 0.3 mm, mu = 0.4 MPa: R0^3 = 8 ml, mu T/R0 = 6 kPa, mu T R0^2 = 48 mJ
+SCALES = fm.Scales(radius=0.02, thickness=3e-4, shear_modulus=4e5)
+
+
+@cache
+def branch() -> fm.Branch:
+    scene = disc_scene(dipole=(20, 4.5), elements=8).replace(scales=SCALES, analysis=fm.Analysis(wrinkling="total"))
+    return fm.trace(scene, start=1.0, until={"volume": 8.0})
+
+
+def test_units_by_hand():
+    units = Units.of("si", SCALES)
+    chosen = {
+        name: (units.unit(name), units.factor(name)) for name in ("volume", "pressure", "center_height", "elastic_energy", "stretch_1")
+    }
+    assert chosen == {
+        "volume": ("ml", pytest.approx(8.0)),
+        "pressure": ("kPa", pytest.approx(6.0)),
+        "center_height": ("mm", pytest.approx(20.0)),
+        "elastic_energy": ("mJ", pytest.approx(48.0)),
+        "stretch_1": ("", 1.0),
+    }
+    assert (axis_label("pressure", units), heading_in("pressure", units)) == ("pressure p in kPa", "p in kPa")
+    assert axis_label("pressure", SCALED) == axis_label("pressure")
+    assert caption(0.5, 0.25, units=units) == "V = 4 ml  p = 1.5 kPa"
+    assert caption(0.5, 0.25) == "V = 0.5  P = 0.25"
+
+
+def test_the_line_of_a_plot_has_the_numbers_of_its_labels():
+    """Measured points in these units can be drawn over it."""
+    scaled, si = branch().plot().axes[0], branch().plot(units="si").axes[0]
+    assert (si.get_xlabel(), si.get_ylabel()) == ("volume V in ml", "pressure p in kPa")
+    lines = [(one.get_xydata(), other.get_xydata()) for one, other in zip(scaled.lines, si.lines, strict=True)]
+    assert lines
+    for one, other in lines:
+        np.testing.assert_allclose(other, one * [8.0, 6.0], rtol=1e-13)
+
+
+def test_meridians_and_zones_in_millimetres():
+    profiles = plots.plot_profiles(branch(), units="si").axes[0]
+    assert profiles.get_xlabel() == "radius in mm"
+    legend = [text.get_text() for text in profiles.get_legend().get_texts()]
+    assert legend[0] == "dipole at height 90 mm"
+    assert legend[1].endswith(" kPa")
+    assert max(np.nanmax(line.get_xdata()) for line in profiles.lines if line.get_label().startswith("V =")) >= 20.0
+    assert any(90.0 in np.asarray(line.get_ydata()) for line in profiles.lines)  # the dipole, at 4.5 R0
+    zones = plots.plot_zones(branch(), units="si").axes[0]
+    assert (zones.get_xlabel(), zones.get_ylabel()) == ("volume V in ml", "reference radius r in mm")
+    assert zones.get_ylim() == pytest.approx((0, 20))
+    assert zones.get_xlim() == pytest.approx((8.0, 64.0))
+
+
+def test_a_report_in_si_units():
+    page = report(branch(), units="si")
+    for text in ("pressure p in kPa", '<th scope="col" class="number">p in kPa</th>', "Cauchy stresses in kPa"):
+        assert text in page
+    (point,) = [p for p in branch().special_points if p.kind == "limit_point"][:1]
+    assert f"{6.0 * point.pressure:.6g}" in re.sub("−", "-", page)  # noqa: RUF001
+    assert "kPa" not in report(branch())
+
+
+@pytest.mark.parametrize("draw", [fm.Branch.plot, plots.plot_profiles, plots.plot_zones, report])
+def test_without_scales_si_units_are_refused(draw):
+    bare = fm.inflate(disc_scene(elements=4), volumes=[1.0])
+    with pytest.raises(InputError, match=r"units = 'si': the scene has no \[scales\]"):
+        draw(bare, units="si")
+    with pytest.raises(InputError, match="units = 'SI': unknown; known: scaled, si"):
+        draw(bare, units="SI")
+
+
+def test_a_sweep_in_si_units(tmp_path):
+    scene = disc_scene(elements=4).replace(scales=SCALES, run=fm.Run(control="volume", values=[1.0, 2.0]))
+    sweep = fm.sweep(scene, {"mesh.degree": [1, 2]}, quantity="run", workers=1)
+    data = sweep.to_xarray()
+    np.testing.assert_allclose(data["pressure_pa"], 6000 * data["pressure"], rtol=1e-14)
+    assert data["volume_m3"].attrs == {"long_name": "enclosed volume, signed along the branch", "units": "m^3"}
+    axes = sweep.plot(show=["pressure.0"], units="si").axes[0]
+    assert axes.get_ylabel() == "step 1: pressure p in kPa"
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), 6 * data["pressure"][:, 0], rtol=1e-14)
+    thicker = fm.sweep(scene, {"scales.thickness": [3e-4, 6e-4]}, quantity="run", workers=1)
+    assert "pressure_pa" not in thicker.to_xarray()
+    with pytest.raises(InputError, match="units = 'si'"):
+        thicker.plot(units="si")

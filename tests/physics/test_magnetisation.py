@@ -288,7 +288,7 @@ def test_scene_files(name, tmp_path):
         ("effects.tension_field", {"remanence": 0.1, "remanence_direction": "normal", "tension_field": True}),
         ("source.kind", {"mesh": fm.torus(8), "sources": [fm.Wire(1.0), fm.Uniform(1.0)], "demagnetization": True}),
     ],
-    ids=str,
+    ids=lambda value: value if isinstance(value, str) else "-".join(value),
 )
 def test_bad_input(key, changes):
     with pytest.raises(fm.InputError) as caught:

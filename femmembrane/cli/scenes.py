@@ -28,7 +28,6 @@ model = "neo-hookean"
 # model = "ogden"                      # in place of the line above
 # mu = [1.4910, 0.0029, -0.0236]
 # alpha = [1.3, 5.0, -2.0]
-# name = "latex-balloon"               # in place of the model: a real material
 
 # [membrane]
 # susceptibility = 2.5                 # needed with a source

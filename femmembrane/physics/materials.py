@@ -91,7 +91,7 @@ class Ogden:
 
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
-    convention: str = field(default=CONVENTIONS[0], repr=False, metadata={"quiet": True})
+    convention: str = field(default=CONVENTIONS[0], repr=False, kw_only=True, metadata={"quiet": True})
 
     def __post_init__(self) -> None:
         for key in ("mu", "alpha"):

@@ -377,7 +377,7 @@ def test_another_convention_of_ogden(tmp_path):
 )
 def test_moduli_in_the_wrong_convention_are_told_so(mu, alpha, convention, message):
     with pytest.raises(fm.InputError, match=message):
-        fm.Ogden(mu, alpha) if convention is None else fm.Ogden(mu, alpha, convention)
+        fm.Ogden(mu, alpha) if convention is None else fm.Ogden(mu, alpha, convention=convention)
 
 
 def test_treloar():

@@ -80,7 +80,7 @@ def snap(name: str, modulus: float, as_dipole: bool, bracket: tuple[float, float
         found[gap] = least.pressure, least.center_height
         return least.pressure
 
-    gap = float(brentq(least_pressure, *bracket, xtol=1e-6))
+    gap = float(brentq(least_pressure, *bracket, xtol=1e-4))
     return gap, found[gap][1]
 
 
@@ -123,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         (near, height), (far, _) = (snap(name, modulus, as_dipole, brackets[modulus][as_dipole]) for as_dipole in (False, True))
         print(f"{name}, {rubber}: snaps from {near * 1e3 * RADIUS:.2f} mm, the pole {-height * 1e3 * RADIUS:.2f} mm down; "
               f"as a dipole it would from {far * 1e3 * RADIUS:.2f} mm")  # fmt: skip
-        gaps = near + (1.28 - near) * np.linspace(1, 0.05, 12) ** 2
+        gaps = near + (1.28 - near) * np.linspace(1, 0.06, 8) ** 2
         curves[rubber] = np.append(gaps, near), [*sinking(name, modulus, gaps.tolist()), height]
         snaps.append((near, height, far))
     draw(curves, out / "magnet.png")

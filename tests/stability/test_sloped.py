@@ -133,3 +133,39 @@ def test_jacobi(scene, height):
     eq = fm.equilibrium(scene, center_height=height)
     assert legendre_test(eq).satisfied
     assert len(jacobi_test(eq).conjugate_points) == eq.verdict("pressure").negative_directions
+
+
+def test_a_cap_and_its_mirror_image():
+    """A normal remanence points to where the pressure pushes. A mirror turns a moment along its normal over, and the dipole with it."""
+    results = []
+    for height, orientation in ((0.5, 1), (-0.5, -1)):
+        scene = fm.Scene(
+            material=fm.NeoHookean(),
+            mesh=fm.cap(height=height, elements=12),
+            degree=4,
+            susceptibility=0.5,
+            demagnetization=True,
+            remanence=0.2,
+            remanence_direction="normal",
+            sources=[fm.Dipole(2.0, 5 * height, orientation)],
+        )
+        eq = fm.equilibrium(scene, volume=1.6)
+        eigenvalues = [azimuthal_eigenvalue(potential_of(scene), eq.state, eq.pressure, n).value for n in (1, 2)]
+        results.append((eq.pressure, eq.energy, *eigenvalues, *eq.profile()["total_stress_1"][:5]))
+    assert results[0] == pytest.approx(results[1], rel=1e-9)
+
+
+@pytest.mark.parametrize(("direction", "turns"), [("normal", True), ("meridional", False)])
+def test_the_material_of_a_magnetised_sphere(direction, turns):
+    """It may turn under its shape at no cost if it is magnetised along its normal, and not if it is along its meridians."""
+    scene = fm.Scene(
+        material=fm.NeoHookean(),
+        mesh=fm.sphere(16),
+        degree=4,
+        remanence=0.2,
+        remanence_direction=direction,
+        sources=[fm.Uniform(0.01)],
+    )
+    eq = fm.equilibrium(scene, volume=6.5)
+    operator = azimuthal_operator(potential_of(scene), eq.state, eq.pressure, 1)
+    assert (operator.spin is not None) is turns

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.accuracy.collocation import collocate
+from femmembrane.accuracy.shooting import shoot
+from femmembrane.accuracy.strong_form import Guess
 from femmembrane.physics.magnetics import magnetic_field
 from femmembrane.potential import potential_of
 from femmembrane.solve.wellposed import apparent, ill_posed
@@ -169,3 +172,29 @@ def test_the_material_of_a_magnetised_sphere(direction, turns):
     eq = fm.equilibrium(scene, volume=6.5)
     operator = azimuthal_operator(potential_of(scene), eq.state, eq.pressure, 1)
     assert (operator.spin is not None) is turns
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"demagnetization": True},
+        {"saturation": 3.0},
+        {"demagnetization": True, "saturation": 3.0},
+        {"demagnetization": True, "saturation": 2.0, "remanence": 0.2, "remanence_direction": "normal", "remanence_transport": "rotated"},
+    ],
+    ids=lambda more: " ".join(map(str, more)),
+)
+def test_shooting_and_collocation(more):
+    """Two methods that share nothing with the elements, on the strong form: the sheet's tension turned out of the meridian."""
+    scene = BELOW.replace(**{"demagnetization": False, **more})
+    eq = fm.equilibrium(scene, center_height=0.5)
+    for method in (collocate,) if more.get("saturation") else (shoot, collocate):  # saturation makes a radius by itself dear
+        found = method(scene, guess=Guess.of(eq), center_height=0.5)
+        assert found.converged
+        for quantity in ("pressure", "volume", "magnetic_energy"):
+            assert getattr(found, quantity) == pytest.approx(getattr(eq, quantity), rel=2e-9), quantity
+
+
+def test_what_the_strong_form_refuses():
+    with pytest.raises(fm.InputError, match=r"membrane\.remanence"):
+        shoot(DEFORMED, guess=Guess(1.0, 0.5, 1.1), center_height=0.5)

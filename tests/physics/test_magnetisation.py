@@ -289,7 +289,7 @@ def test_scene_files(name, tmp_path):
         ("effects.tension_field", {"remanence": 0.1, "remanence_direction": "normal", "tension_field": True}),
         ("source.kind", {"mesh": fm.torus(8), "sources": [fm.Wire(1.0), fm.Uniform(1.0)], "demagnetization": True}),
     ],
-    ids=str,
+    ids=lambda part: part if isinstance(part, str) else " ".join(part),
 )
 def test_bad_input(key, changes):
     with pytest.raises(fm.InputError) as caught:

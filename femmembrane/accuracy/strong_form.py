@@ -12,8 +12,8 @@ are (e_2, eta, d, phi) with d = e_1 - e_2: at the pole d and phi vanish and ever
 
     y' = S y/r + f(r, y),      S = [[0 0 1 0], [0 0 0 0], [0 0 -2 0], [0 0 0 -1]],      f(0, y) = (0, 0, 0, (m_eta - P lambda^2)/W_1)
 
-and at the rim e_2 = eta = 0, or what its own place asks for. The energies, the volume and the force of the sources follow from the
-formulas of the material and the sources.
+and at the rim e_2 = eta = 0, or what its own place asks for. An energy that depends on the slope of the meridian changes both equations,
+:mod:`.sloped`. The energies, the volume and the force of the sources follow from the formulas of the material and the sources.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from ..errors import InputError
 from ..physics.loads import over_projection, over_reference
 from ..physics.magnetisation import Magnetisation, position_energy_density, sources_that_act
 from ..scene import Scene
+from .sloped import is_strong, pull
 
 Array = NDArray[np.float64]
 
@@ -79,10 +80,10 @@ class StrongForm:
         self.saturation = scene.saturation
         self.sources = sources_that_act(scene)
         magnetisation = Magnetisation.of(scene) if self.sources else None
-        if magnetisation is not None and magnetisation.tilts:
-            key = "membrane.remanence" if magnetisation.remanence is not None else "effects.demagnetization"
-            allowed = "none is allowed here: these equations have magnetic energies that depend on the position alone"
-            raise InputError(key, scene.remanence if magnetisation.remanence is not None else True, allowed)
+        self.sloped = magnetisation if magnetisation is not None and magnetisation.tilts else None
+        if self.sloped is not None and not is_strong(self.sloped):
+            allowed = 'none is allowed here but a number that is "normal" and "rotated": others change with the stretches, or have a cone'
+            raise InputError("membrane.remanence", scene.remanence, allowed)
         self.loads = tuple(load for load in scene.loads if load.acts)
         self.evaluations = 0
 
@@ -104,12 +105,21 @@ class StrongForm:
         s11, s12, _ = self.material.tangent(e1, e2)
         m_rho, m_eta = self.force(l2 * r, eta)
         pressure = pressure - over_projection(self.loads, eta)[1]
+        turned = None if self.sloped is None else pull(self.sloped, self.sources, l2 * r, eta, cos, sin)
+        if turned is not None:
+            m_rho, m_eta = m_rho + turned.rho, m_eta + turned.eta
         # differences of nearly equal numbers at the pole are written so that they keep their digits
         excess = np.expm1(d) * cos - 2 * np.sin(phi / 2) ** 2  # rho'/lambda_2 - 1
         along = (s2 - s1 + s2 * excess) / r + l1 * (m_rho * cos + m_eta * sin)
         e2_r = excess / r
-        e1_r = (along - s12 * e2_r) / (s11 - s1)
-        phi_r = (-s2 * np.exp(d) * sin / r + l1 * (m_eta * cos - m_rho * sin) - pressure * l2 * l1**2) / s1
+        across = -s2 * np.exp(d) * sin / r + l1 * (m_eta * cos - m_rho * sin) - pressure * l2 * l1**2
+        if turned is None:
+            e1_r = (along - s12 * e2_r) / (s11 - s1)
+            phi_r = across / s1
+        else:  # both equations times lambda_1/r
+            a, b, c = s11 - s1, -turned.turning, s1 + turned.stiffness
+            right = along - s12 * e2_r, across - turned.turning / r - l1 * turned.along
+            e1_r, phi_r = (right[0] * c - b * right[1]) / (a * c - b * b), (a * right[1] - b * right[0]) / (a * c - b * b)
         return np.array([e2_r, l1 * sin, e1_r - e2_r, phi_r])
 
     def regular(self, r: Array, y: Array, pressure: float) -> Array:
@@ -127,6 +137,8 @@ class StrongForm:
         e2, eta, d, phi = y
         l1, rho = np.exp(e2 + d), np.exp(e2) * r
         magnetic = self._magnetic(rho, eta) if self.sources else np.zeros_like(rho)
+        if self.sloped is not None:
+            magnetic = pull(self.sloped, self.sources, rho, eta, np.cos(phi), np.sin(phi)).value
         elastic = self.material.energy(e2 + d, e2)
         return 2 * np.pi * np.array([rho * l1 * np.cos(phi) * (eta - self.rim[1]), r * elastic, r * magnetic])
 
@@ -137,9 +149,13 @@ class StrongForm:
         s11, s12, _ = self.material.tangent(e, e)
         curvature = self._lift(e, center_height, pressure) / 2  # phi = curvature r
         m_rho, m_eta = self.force(stretch * r, center_height)
-        pull = stretch * (m_rho / r + m_eta * curvature)
+        if self.sloped is not None:
+            angle = curvature * r
+            turned = pull(self.sloped, self.sources, stretch * r, center_height + 0 * angle, np.cos(angle), np.sin(angle))
+            m_rho, m_eta = m_rho + turned.rho + turned.turning / stretch * curvature, m_eta + turned.eta
+        inward = stretch * (m_rho / r + m_eta * curvature)
         # 4 (d/r^2) is the limit of f_d/r
-        d = (((s12 - s) * curvature**2 / 2 + pull) / (s11 - s) + curvature**2 / 2) / 4
+        d = (((s12 - s) * curvature**2 / 2 + inward) / (s11 - s) + curvature**2 / 2) / 4
         square = r * r
         return np.array(
             [e + (d - curvature**2 / 2) * square / 2, center_height + stretch * curvature * square / 2, d * square, curvature * r]
@@ -147,10 +163,10 @@ class StrongForm:
 
     def force(self, rho: Any, eta: Any) -> tuple[Any, Any]:
         """Gradient (m_rho, m_eta) of the energy density of sources and loads per reference area."""
-        if not (self.sources or self.loads):
+        if not (self.loads or (self.sources and self.sloped is None)):
             return 0.0, 0.0
         place = np.array([rho + 1j * _STEP, rho + 0j]), np.array([eta + 0j, eta + 1j * _STEP])
-        values = over_reference(self.loads, *place) + (self._magnetic(*place) if self.sources else 0j * place[0])
+        values = over_reference(self.loads, *place) + (self._magnetic(*place) if self.sources and self.sloped is None else 0j * place[0])
         gradient = values.imag / _STEP
         return gradient[0], gradient[1]
 
@@ -162,6 +178,10 @@ class StrongForm:
         stress, _ = self.material.stress(e, e)
         _, m_eta = self.force(np.zeros_like(eta), eta)
         pressure = pressure - over_projection(self.loads, eta)[1]
+        if self.sloped is not None:
+            zero = np.zeros_like(eta)
+            turned = pull(self.sloped, self.sources, zero, eta, 1 + zero, zero)
+            return np.exp(e) * (m_eta + turned.eta - 2 * turned.along - pressure * np.exp(2 * e)) / (stress + turned.stiffness)
         return np.exp(e) * (m_eta - pressure * np.exp(2 * e)) / stress
 
 

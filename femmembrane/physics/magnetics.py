@@ -134,7 +134,7 @@ class Dipole(Source):
     height : float
         Signed height over the plane of the rim, in units of R0; negative below.
     orientation : {1, -1}
-        Sense of the moment; matters only beside another source.
+        Sense of the moment; matters beside another source, or to a remanence.
 
     Raises
     ------

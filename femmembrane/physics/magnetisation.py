@@ -18,7 +18,8 @@ remanence                 -m_0.h beside the induced part, which then feels h_n -
 The self-field screens a normal remanence as it screens a normal field: the minimum above leaves no choice. With a susceptibility and
 self-field the remanence so becomes -m_0 h_n/(1 + chi).
 
-The remanence m_0 is carried by the sheet. Both ways are in the literature:
+The remanence m_0 is carried by the sheet: along the normal, positive to where the pressure pushes, or along the meridian from its first
+end. Both ways of carrying it are in the literature:
 
 ==========  ========================  =======================  ==========================================================
 transport   normal                    meridional               m
@@ -114,6 +115,11 @@ class Magnetisation:
     def normal(self) -> bool:
         """Whether there is a remanence along the normal."""
         return self.remanence is not None and self.direction == "normal"
+
+    @property
+    def turns(self) -> bool:
+        """Whether a sphere is the same when its material has turned under its shape."""
+        return self.remanence is None or (self.normal and not isinstance(self.remanence, Along))
 
     @property
     def meridional(self) -> bool:
@@ -275,9 +281,13 @@ def seen_by(scene: Any) -> frozenset[str]:
     return frozenset(tilted).union(*(source.sees for source in sources))
 
 
-def remanence_column(magnetisation: Magnetisation | None, R: Any, Z: Any, s: Any) -> Any:
-    """The remanence at points of the meridian; None where there is none."""
+def remanence_column(magnetisation: Magnetisation | None, R: Any, Z: Any, s: Any, side: int) -> Any:
+    """The remanence at points of the meridian; None where there is none.
+
+    A normal one points to where the pressure pushes: ``side`` is 1 where that is the side of the normal (-Z', R'), else -1.
+    """
     if magnetisation is None or magnetisation.remanence is None:
         return None
     given = magnetisation.remanence
-    return np.array(given.at(R, Z, s)) if isinstance(given, Along) else given + 0.0 * s
+    values = np.array(given.at(R, Z, s)) if isinstance(given, Along) else given + 0.0 * s
+    return side * values if magnetisation.normal else values

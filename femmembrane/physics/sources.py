@@ -181,7 +181,8 @@ class Wire(Source):
 
 @dataclass(frozen=True)
 class Uniform(Source):
-    """Uniform field along the axis; alone it exerts no force on the membrane, beside another source it does.
+    """Uniform field along the axis. Alone it exerts no force on a weakly magnetised membrane. It does beside another source, on a sheet
+    with self-field and on a remanence.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """The total potential of a scene on its finite-element space, with exact derivatives; CasADi stays in here.
 
 - :mod:`.expressions`: the densities at a point, as CasADi expressions of the terms that the scene has
+- :mod:`.magnetic`: energies of magnetised sheets that are more than those of a weak field
 - :mod:`.replay`: the instructions of such a function, on whole vectors of points
 - :mod:`.potential`: values and derivatives at a state
 - :mod:`.family`: the potential of scenes that differ in one number

@@ -21,7 +21,7 @@ from ..discretization.space import Space
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, hub_density, lidded_volume_density, over_projection, over_reference, volume_density, wall_density
 from ..physics.magnetics import Source, magnetic_energy_density
-from ..physics.magnetisation import Magnetisation
+from ..physics.magnetisation import Magnetisation, remanence_column
 from ..physics.tension_field import strain_energy
 from ..threads import Guard
 from .magnetic import point_energy
@@ -91,7 +91,8 @@ def point_expressions(
         near = Nearby(sources, R + u, Z + w)
         magnetisation = Magnetisation.of(scene)
         if magnetisation is not None:
-            remanence = data[columns.index("remanence")] if "remanence" in columns else magnetisation.remanence
+            own = "remanence" in columns
+            remanence = data[columns.index("remanence")] if own else remanence_column(magnetisation, 0.0, 0.0, 0.0, space.side)
             rates = (R_x if flat else np.sqrt(R_x**2 + Z_x**2)), R
             found = point_energy(magnetisation, near.sources, (R + u, Z + w), (R_x + u_x, Z_x + w_x), rates, remanence, local)
             magnetic, first, second = (area * parameters[1] * part for part in found)

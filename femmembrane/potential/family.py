@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ..kernels.interface import Array
+from ..physics.magnetisation import Magnetisation
 from ..threads import cached_property
 from .expressions import BUILDING, casadi_answers_numpy
 from .potential import Potential, require_elements
@@ -53,6 +54,7 @@ class Family(Potential):
         with casadi_answers_numpy():
             super().__init__(vary(number), quadrature)
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
+        self.magnetisation = Magnetisation.of(scene) if scene.sources else None
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)

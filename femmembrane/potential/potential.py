@@ -197,7 +197,7 @@ class Potential:
         if self.sheet is not None:
             columns |= self.sheet.columns(space.R, space.Z, space.s)
         if self.magnetisation is not None and isinstance(self.magnetisation.remanence, Along):
-            columns["remanence"] = remanence_column(self.magnetisation, space.R, space.Z, space.s)
+            columns["remanence"] = remanence_column(self.magnetisation, space.R, space.Z, space.s, space.side)
         if space.lift is not None:
             columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
@@ -405,7 +405,7 @@ class Potential:
         """
         if not self.tilts:
             return None
-        remanence = remanence_column(self.magnetisation, R, Z, s)
+        remanence = remanence_column(self.magnetisation, R, Z, s, self.space.side)
         return at_points(self._wave_function, rho, eta, *slopes, R, np.zeros_like(rho) if remanence is None else remanence)
 
     @cached_property

@@ -3,7 +3,7 @@
 ======================== ==================================================================================================
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
-``membrane.susceptibility``  chi
+``membrane.susceptibility``  chi; ``membrane.saturation`` and ``membrane.remanence``, where they are numbers
 ``material.NAME``        a number of a material that has such an argument; others change with it where its ``numbers_with`` says so
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
 ``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
@@ -70,7 +70,7 @@ class Parameter:
         """The number in the scene given."""
         part, _, rest = self.name.partition(".")
         if part == "membrane":
-            return float(self.scene.susceptibility or 0.0)
+            return float(getattr(self.scene, rest) or 0.0)
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
         owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
@@ -89,7 +89,7 @@ class Parameter:
         """
         part, _, rest = self.name.partition(".")
         if part == "membrane":
-            return self.scene.replace(susceptibility=value)
+            return self.scene.replace(**{rest: value})
         if part == "material":
             material: Any = self.scene.material
             if rest.startswith("mu."):
@@ -113,7 +113,10 @@ class Parameter:
         sources: tuple[Any, ...] = scene.sources
         loads: tuple[Any, ...] = scene.loads
         susceptibility = scene.susceptibility
-        if part == "membrane" and Magnetisation.of(scene) is not None:
+        magnetisation = {name: getattr(scene, name) for name in MAGNETISATION}
+        if rest in magnetisation:
+            magnetisation[rest] = value
+        elif part == "membrane" and Magnetisation.of(scene) is not None:
             susceptibility = value
         elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
@@ -131,8 +134,8 @@ class Parameter:
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
-        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", *MAGNETISATION)
-        return SimpleNamespace(**parts, **{name: getattr(scene, name) for name in kept})
+        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
+        return SimpleNamespace(**parts, **magnetisation, **{name: getattr(scene, name) for name in kept})
 
     def _check_modulus(self, value: float, alpha: float) -> None:
         if not 0 < value * alpha < 2:
@@ -162,6 +165,7 @@ def names(scene: Scene) -> list[str]:
     found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
     if scene.sources:
         found.append("membrane.susceptibility")
+        found += [f"membrane.{name}" for name in ("saturation", "remanence") if isinstance(getattr(scene, name), Real)]
     material = scene.material
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]

@@ -103,7 +103,8 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     if len(motions):
         area = potential.bulk
         rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
-    if n == 1 and space.spins and potential.sheet is None:
+    turns = potential.magnetisation is None or potential.magnetisation.turns
+    if n == 1 and space.spins and potential.sheet is None and turns:
         spin = _spin(space, layout, response, motions, pencil_of(band, mass, layout.half_bandwidth, None, 0.0, rigid))
     return AzimuthalOperator(band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
 

@@ -105,6 +105,6 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     if magnetisation is None:
         total = total_stress(mechanical, *surroundings, scene.susceptibility or 0.0)
     else:
-        stretches, remanence = (np.exp(e1), np.exp(e2)), remanence_column(magnetisation, R, Z, s)
+        stretches, remanence = (np.exp(e1), np.exp(e2)), remanence_column(magnetisation, R, Z, s, space.side)
         total = magnetised_stress(mechanical, *surroundings, stretches, magnetisation, remanence)
     return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total)

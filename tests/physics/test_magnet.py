@@ -398,3 +398,19 @@ def test_outline():
     assert np.array(RING.outline().points) == pytest.approx(np.array([(0.2, -0.1), (0.5, -0.1), (0.5, 0.7), (0.2, 0.7), (0.2, -0.1)]))
     assert np.array(CYLINDER.outline().points) == pytest.approx(np.array([(0.0, -0.1), (0.5, -0.1), (0.5, 0.7), (0.0, 0.7)]))
     assert CYLINDER.outline().moment == -RING.outline().moment == 1
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{"demagnetization": True}, {"demagnetization": True, "saturation": 3.0}, {"remanence": 0.2, "remanence_direction": "normal"}],
+    ids=["self-field", "saturation", "remanence"],
+)
+def test_a_magnetised_sheet_feels_the_derivatives_that_are_written_out(effects):
+    """As beside a stack of loops, whose field CasADi differentiates; verdicts too."""
+    magnet, solenoid = (
+        fm.equilibrium(magnetic_scene(source, elements=4, degree=4).replace(**effects), center_height=0.8)
+        for source in (fm.Magnet(2.5, 0.6, 0.8, 0.5), fm.Solenoid(0.5, 2.5, 0.6, 0.8, loops=16))
+    )
+    assert magnet.pressure == pytest.approx(solenoid.pressure, rel=1e-12)
+    values = [eq.verdict(azimuthal=1).smallest_eigenvalue for eq in (magnet, solenoid)]
+    assert values[0] == pytest.approx(values[1], rel=1e-10)

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.accuracy.collocation import collocate
+from femmembrane.accuracy.shooting import shoot
+from femmembrane.accuracy.strong_form import Guess
 from femmembrane.physics.magnetics import magnetic_field
 from femmembrane.potential import potential_of
 from femmembrane.solve.wellposed import apparent, ill_posed
@@ -133,3 +136,65 @@ def test_jacobi(scene, height):
     eq = fm.equilibrium(scene, center_height=height)
     assert legendre_test(eq).satisfied
     assert len(jacobi_test(eq).conjugate_points) == eq.verdict("pressure").negative_directions
+
+
+def test_a_cap_and_its_mirror_image():
+    """A normal remanence points to where the pressure pushes. A mirror turns a moment along its normal over, and the dipole with it."""
+    results = []
+    for height, orientation in ((0.5, 1), (-0.5, -1)):
+        scene = fm.Scene(
+            material=fm.NeoHookean(),
+            mesh=fm.cap(height=height, elements=12),
+            degree=4,
+            susceptibility=0.5,
+            demagnetization=True,
+            remanence=0.2,
+            remanence_direction="normal",
+            sources=[fm.Dipole(2.0, 5 * height, orientation)],
+        )
+        eq = fm.equilibrium(scene, volume=1.6)
+        eigenvalues = [azimuthal_eigenvalue(potential_of(scene), eq.state, eq.pressure, n).value for n in (1, 2)]
+        results.append((eq.pressure, eq.energy, *eigenvalues, *eq.profile()["total_stress_1"][:5]))
+    assert results[0] == pytest.approx(results[1], rel=1e-9)
+
+
+@pytest.mark.parametrize(("direction", "turns"), [("normal", True), ("meridional", False)])
+def test_the_material_of_a_magnetised_sphere(direction, turns):
+    """It may turn under its shape at no cost if it is magnetised along its normal, and not if it is along its meridians."""
+    scene = fm.Scene(
+        material=fm.NeoHookean(),
+        mesh=fm.sphere(16),
+        degree=4,
+        remanence=0.2,
+        remanence_direction=direction,
+        sources=[fm.Uniform(0.01)],
+    )
+    eq = fm.equilibrium(scene, volume=6.5)
+    operator = azimuthal_operator(potential_of(scene), eq.state, eq.pressure, 1)
+    assert (operator.spin is not None) is turns
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"demagnetization": True},
+        {"saturation": 3.0},
+        {"demagnetization": True, "saturation": 3.0},
+        {"demagnetization": True, "saturation": 2.0, "remanence": 0.2, "remanence_direction": "normal", "remanence_transport": "rotated"},
+    ],
+    ids=lambda more: " ".join(map(str, more)),
+)
+def test_shooting_and_collocation(more):
+    """Two methods that share nothing with the elements, on the strong form: the sheet's tension turned out of the meridian."""
+    scene = BELOW.replace(**{"demagnetization": False, **more})
+    eq = fm.equilibrium(scene, center_height=0.5)
+    for method in (collocate,) if more.get("saturation") else (shoot, collocate):  # saturation makes a radius by itself dear
+        found = method(scene, guess=Guess.of(eq), center_height=0.5)
+        assert found.converged
+        for quantity in ("pressure", "volume", "magnetic_energy"):
+            assert getattr(found, quantity) == pytest.approx(getattr(eq, quantity), rel=2e-9), quantity
+
+
+def test_what_the_strong_form_refuses():
+    with pytest.raises(fm.InputError, match=r"membrane\.remanence"):
+        shoot(DEFORMED, guess=Guess(1.0, 0.5, 1.1), center_height=0.5)

@@ -72,6 +72,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "error": Quantity("uncertainty of the special point's location"),
     "tangent": Quantity("direction of the branch on which it was found, in the unknowns and the pressure"),
     "azimuthal": Quantity("number of waves around the axis of the instability that sets in", type=int),
+    "trace_border": Quantity("softest displacement at the last point of a trace over a number"),
     "trace_sigma": Quantity("arc length, or load, at the last points of the path"),
     "trace_point": Quantity("state and pressure at the last points of the path"),
     "trace_slope": Quantity("their derivatives with respect to arc length or load"),

@@ -14,6 +14,7 @@ from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status, printable
 from ..scene import WRINKLING
+from ..scene.variation import Parameter
 from ..solve.controls import control_kind
 from ..threads import one_thread
 from . import door
@@ -102,6 +103,21 @@ class Equilibrium:
         from ..potential import potential_of
 
         return potential_of(self.scene)
+
+    def number(self, name: str) -> float:
+        """A number of its scene.
+
+        Parameters
+        ----------
+        name : str
+            As :mod:`femmembrane.scene.variation` has it: ``source.0.height``.
+
+        Raises
+        ------
+        InputError
+            For a name that the scene does not have.
+        """
+        return Parameter(self.scene, name).value
 
     def in_scene(self, scene: Scene) -> Equilibrium:
         """The same equilibrium in a scene with the same potential, which may have other scales and other analyses.
@@ -328,12 +344,15 @@ class TraceMemory(PathMemory):
         Changes of inertia met so far at which no special point was located.
     known : float
         Relative size of the last correction of the point from which the next step sets out.
+    border : ndarray, shape (n_free,), or None
+        Over a number: the softest displacement at that point, by which its equations are solved.
     """
 
     step: float
     regular: int
     unexplained: tuple[str, ...] = ()
     known: float = 0.0
+    border: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,6 +419,11 @@ class Branch(Sequence[Equilibrium]):
         Which solver found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     remarks : tuple of str
         Remarks on how the run went on, for instance that another processor began it.
+    over : str
+        The number of the scene that changes along the branch, by its name, such as ``source.0.height``; empty where none does. Every
+        equilibrium has the scene with its own value, and the name is one of the columns.
+    hold : mapping of str to float
+        What is held meanwhile, and at which value.
 
     Examples
     --------
@@ -421,6 +445,8 @@ class Branch(Sequence[Equilibrium]):
     jumps: tuple[Jump, ...] = ()
     solver: str = ""
     remarks: tuple[str, ...] = ()
+    over: str = ""
+    hold: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -445,8 +471,8 @@ class Branch(Sequence[Equilibrium]):
         Parameters
         ----------
         name : str
-            ``step``, ``status``, any column of the table or an energy. ``lambda_`` or ``verdict_`` is followed by pressure, volume, n1, n2,
-            ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for error estimates (relative errors at
+            ``step``, ``status``, any column of the table, an energy, or a number of the scene by its name. ``lambda_`` or ``verdict_``
+            is followed by pressure, volume, n1, n2, ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for error estimates (relative errors at
             the load that its [run] prescribes, else at the volume). A scene with scales has ``pressure_pa`` as well.
 
         Raises
@@ -462,13 +488,22 @@ class Branch(Sequence[Equilibrium]):
         from .analyses import printed
 
         columns = printed(self.scene)
-        head = f"{'step':>4} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(f"  {c.heading:<{c.width}}" for c in columns)
+        own = f" {self.over:>{self._width}}" if self.over else ""
+        head = f"{'step':>4}{own} {'volume':>12} {'pressure':>12} {'pole height':>12}" + "".join(
+            f"  {c.heading:<{c.width}}" for c in columns
+        )
         lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
-            numbers = f"{k:>4} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
+            own = f" {eq.number(self.over):>{self._width}.6g}" if self.over else ""
+            numbers = f"{k:>4}{own} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}"
             lines.append(numbers + "".join(f"  {c.text(eq):<{c.width}}" for c in columns))
         lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)
+
+    @property
+    def _width(self) -> int:
+        """Of the column of the number."""
+        return max(len(self.over), 12)
 
     @property
     def mesh_used(self) -> str:
@@ -525,7 +560,7 @@ class Branch(Sequence[Equilibrium]):
         door.write_vtk(self, path)
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
-        """Pressure against volume as a Matplotlib figure.
+        """Pressure against volume as a Matplotlib figure; over a number what answers to it, at what is held.
 
         Parameters
         ----------

@@ -165,7 +165,7 @@ class LoadRun(Run[Branch]):
     def _limit(self, turn: Turn) -> SpecialPoint | None:
         if turn.fold is None:
             return None
-        return special_point(self.scene.replace(analysis=type(self.scene.analysis)()), self.potential, turn.fold)
+        return special_point(self, self.scene_of(turn.fold.point.state).replace(analysis=type(self.scene.analysis)()), turn.fold)
 
     def _load_of(self, start: Equilibrium, state: State) -> float:
         """The load of a start as it was given; that of the state it was corrected to where the two differ, as in another scene."""
@@ -177,6 +177,6 @@ class LoadRun(Run[Branch]):
         return given if abs(found - given) <= 1e-9 * max(abs(given), self.potential.space.units[held.name]) else found
 
     def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
-        memory = None if found is None else remembered(self.path.memory, self.potential.space.n_free)
+        memory = None if found is None else remembered(self.path.memory, self.potential.space.n_free + 1)
         known = tuple(self.found) if found is None else found
         return Branch(self.scene, known, status, message, dict(self.timings), None, memory, tuple(self.jumps), self.path.solver)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from ..errors import SolveError, Status
 from ..results.records import Branch, Equilibrium, SpecialPoint
@@ -11,6 +12,7 @@ from ..solve.continuation import StepControl
 from ..threads import one_thread
 from .arguments import check_scene
 from .meshing import on_chosen_mesh
+from .number_trace import NumberTraceRequest
 from .running import carry_out
 from .state_records import OnCheckpoint, OnStep
 from .trace_run import TraceRequest
@@ -22,7 +24,9 @@ def trace(
     *,
     start: float | Equilibrium | SpecialPoint | Branch | None = None,
     until: Mapping[str, float] | None = None,
-    direction: int = 1,
+    over: str | None = None,
+    hold: Mapping[str, float] | None = None,
+    direction: int | None = None,
     max_steps: int = 400,
     steps: StepControl | None = None,
     special_points: bool = True,
@@ -43,10 +47,18 @@ def trace(
         a branch of this scene) the *other* branch that crosses there is traced, one half of it: ``fm.trace(scene, start=point)``. From
         another special point that is an equilibrium of this branch the trace sets out as from that equilibrium.
     until : mapping, optional
-        Where to end: values of any of volume, pressure, center_height, whichever is met first; the last point lies exactly on it. The
-        start itself does not count, and what lies behind it is met, if at all, on a distant part of the branch: see ``direction``.
-    direction : {1, -1}
-        1 sets out towards larger volume. From a branch point it names the half of the other branch: 1 that on which the volume grows,
+        Where to end: values of any of volume, pressure, center_height, and over a number of the number by its name, whichever is met
+        first; the last point lies exactly on it. The start itself does not count, and what lies behind it is met, if at all, on a distant
+        part of the branch: see ``direction``.
+    over : str, optional
+        A number of the scene that changes along the branch in place of the load, such as ``source.0.height``: see
+        :mod:`femmembrane.scene.variation`. It sets out from its value in ``scene``, and every equilibrium has its own scene.
+    hold : mapping, optional
+        What is held meanwhile: a value of one of volume, pressure, center_height. The membrane is first brought there from ``start``;
+        without a start, as :func:`equilibrium` finds it.
+    direction : {1, -1}, optional
+        1 (default) sets out towards larger volume; over a number to larger numbers, and by default towards the value of it in ``until``.
+        From a branch point it names the half of the other branch: 1 that on which the volume grows,
         or where it is stationary, as on both halves of a pitchfork, that on which the pole rises (with the pole held, the membrane).
     max_steps : int
         Most steps.
@@ -77,9 +89,11 @@ def trace(
         carries the branch as ``result``.
     """
     check_scene(scene)
-    request = TraceRequest.checked(
-        start, until, direction=direction, max_steps=max_steps, steps=steps, ill_posed=ill_posed, special_points=special_points
-    )
+    common: dict[str, Any] = {"max_steps": max_steps, "steps": steps, "ill_posed": ill_posed, "special_points": special_points}
+    if over is None and hold is None:
+        request = TraceRequest.checked(start, until, direction=1 if direction is None else direction, **common)
+    else:
+        request = NumberTraceRequest.over_number(scene, start, until, over=over, hold=hold, direction=direction, **common)
     branch = carry_out(on_chosen_mesh(scene, request), on_step=on_step, on_checkpoint=on_checkpoint)
     if throw and branch.message and (until is not None or branch.status is not Status.STEP_LIMIT):
         raise SolveError(branch.message, status=branch.status, result=branch)

@@ -72,13 +72,16 @@ MARKERS = {
     "limit_point": ("o", "limit point (dP = 0)"),
     "volume_fold": ("s", "volume fold (dV = 0)"),
     "height_fold": ("^", "height fold"),
+    "number_fold": ("h", "limit point in the number"),
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
 }
 
 
 def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None) -> Figure:
-    """Pressure against volume; line styles tell the verdicts that the scene asked for, markers the special points found.
+    """Pressure against volume, or over a number what answers to it.
+
+    Line styles tell the verdicts that the scene asked for, markers the special points found.
 
     Parameters
     ----------
@@ -94,7 +97,7 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     """
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.6), title=branch.scene.title)
-    draw_branch(axes, branch)
+    draw_branch(axes, branch, across=branch.over or "volume", up=answer(branch))
     draw_legend(axes, "among axisymmetric shapes:" if branch.scene.analysis.stability else None)
     return save_figure(figure, path)
 
@@ -260,7 +263,7 @@ def draw_branch(
     axes : matplotlib Axes
     branch : Branch
     across, up : {"volume", "pressure", "center_height"}
-        What the axes show.
+        What the axes show; of a branch over a number also that, by its name.
     style : Style, optional
         One style for the whole line, in place of the verdicts'.
     dots : bool, optional
@@ -274,10 +277,10 @@ def draw_branch(
         For an unknown quantity.
     """
     for key, name in (("across", across), ("up", up)):
-        if name not in PLACES:
-            raise unknown_name(key, name, PLACES)
-    axes.set_xlabel(QUANTITIES[across].label)
-    axes.set_ylabel(QUANTITIES[up].label)
+        if name not in (*PLACES, branch.over):
+            raise unknown_name(key, name, [*PLACES, *([branch.over] if branch.over else [])])
+    axes.set_xlabel(axis_label(across))
+    axes.set_ylabel(axis_label(up))
     axes.grid(color="0.9", linewidth=0.6)
     points = _coordinates(branch, (across, up))
     gaps = _gaps(branch, (across, up))
@@ -326,8 +329,25 @@ def _style(words: Mapping[str, str]) -> Style:
     return UNSTABLE if words["volume"] == "unstable" else BOTH if words["pressure"] == "stable" else VOLUME_ONLY
 
 
+def answer(branch: Branch) -> str:
+    """The quantity that a branch is drawn by: the pressure, or the height of the pole where a pressure is held."""
+    return "center_height" if "pressure" in branch.hold else "pressure"
+
+
+def axis_label(name: str) -> str:
+    """The text at an axis that shows a quantity, or a number of the scene."""
+    return QUANTITIES[name].label if name in QUANTITIES else name
+
+
 def _coordinates(items: Sequence[Equilibrium | SpecialPoint], quantities: Sequence[str]) -> Array:
-    return np.array([[getattr(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
+    return np.array([[_value(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
+
+
+def _value(item: Equilibrium | SpecialPoint, quantity: str) -> float:
+    if "." in quantity:
+        equilibrium: Equilibrium = getattr(item, "equilibrium", item)
+        return equilibrium.number(quantity)
+    return float(getattr(item, quantity))
 
 
 #: the special points between two neighbouring equilibria, in order: the verdicts that can change there (None: any) and their places in
@@ -336,12 +356,13 @@ _Gap = list[tuple[tuple[Any, ...] | None, Array]]
 _SNAP = ("snap",)
 
 
-def _changes(point: SpecialPoint) -> tuple[Any, ...] | None:
-    """The verdicts that can change at a special point, by control or number of waves."""
+def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:
+    """The verdicts that can change at a special point, by control or number of waves. Over a number what is held decides."""
     of_kind: dict[str, tuple[Any, ...]] = {
-        "limit_point": ("pressure",),
-        "volume_fold": ("volume",),
+        "limit_point": () if branch.over else ("pressure",),
+        "volume_fold": () if branch.over else ("volume",),
         "height_fold": (),
+        "number_fold": tuple(branch.hold),
         "azimuthal_onset": (point.azimuthal,),
     }
     return of_kind.get(str(point.kind))
@@ -353,17 +374,18 @@ def _gaps(branch: Branch, quantities: Sequence[str]) -> list[_Gap]:
     A special point lies between the two neighbours for which the way over it is the smallest detour, in volume, pressure and pole height
     together (in a picture of two of them the branch may cross itself); one that is far from the points shown lies between none.
     """
-    points, special = _coordinates(branch, PLACES), list(branch.special_points or ())
+    known = (*PLACES, branch.over) if branch.over else PLACES
+    points, special = _coordinates(branch, known), list(branch.special_points or ())
     scale = np.maximum(np.ptp(points, axis=0), 1e-300) if len(points) else 1.0
     a, b = points[:-1] / scale, points[1:] / scale
     direct = np.linalg.norm(b - a, axis=1)
     inside: list[list[tuple[float, SpecialPoint, Array]]] = [[] for _ in direct]
-    places, pictured = _coordinates(special, PLACES) / scale, _coordinates(special, quantities)
+    places, pictured = _coordinates(special, known) / scale, _coordinates(special, quantities)
     for item, place, drawn in zip(special, places, pictured, strict=True):
         detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
         if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
             inside[k].append((float((place - a[k]) @ (b[k] - a[k])), item, drawn))
-    ordered: list[_Gap] = [[(_changes(item), drawn) for _, item, drawn in sorted(gap, key=lambda g: g[0])] for gap in inside]
+    ordered: list[_Gap] = [[(_changes(branch, item), drawn) for _, item, drawn in sorted(gap, key=lambda g: g[0])] for gap in inside]
     for jump in branch.jumps:
         for k, (before, landing) in enumerate(pairwise(branch)):
             if landing is jump.landing:  # by way of the fold where the branch turned back

@@ -144,10 +144,14 @@ class _Page:
         return f"<figure>\n{svg}{about}</figure>"
 
     def _branch(self) -> str:
-        figures = []
-        for across, label in (("volume", "Pressure against volume"), ("center_height", "Pressure against pole height")):
+        figures, over = [], self.branch.over
+        drawn = [("volume", "pressure", "Pressure against volume"), ("center_height", "pressure", "Pressure against pole height")]
+        if over:
+            up = plots.answer(self.branch)
+            drawn = [(over, up, f"{up.replace('_', ' ').capitalize()} against {over}"), drawn[0]]
+        for across, up, label in drawn:
             figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
-            plots.draw_branch(axes, self.branch, across=across)
+            plots.draw_branch(axes, self.branch, across=across, up=up)
             _legend_below(figure, axes)
             figures.append(self._figure(figure, label))
         return _beside(*figures) + self._special_points() + self._jumps()
@@ -159,9 +163,11 @@ class _Page:
         if not points:
             return "<p>Searched for special points: there are none.</p>"
         names = {kind: name for kind, (_, name) in plots.MARKERS.items()}
+        over = self.branch.over
         rows = [
             [
                 names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
+                *([p.equilibrium.number(over)] if over else []),
                 p.volume,
                 p.pressure,
                 p.center_height,
@@ -169,7 +175,7 @@ class _Page:
             ]
             for p in points
         ]
-        return table(["special point", "V", "P", "pole height", "relative error"], rows)
+        return table(["special point", *([over] if over else []), "V", "P", "pole height", "relative error"], rows)
 
     def _jumps(self) -> str:
         rows = []

@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 
 import femmembrane as fm
+from femmembrane import quantities
 from femmembrane.files import write_csv
 from femmembrane.views import plots
 
@@ -131,7 +132,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 def label(axes: Any, of: fm.Scene) -> None:
     source = of.sources[0]
-    axes.set(xlabel=plots.RADIUS_LABEL, ylabel="height η/R₀", title=f"M = {source.strength:g}, h = {source.height:g}")
+    axes.set(
+        xlabel=quantities.axis_label("rho"), ylabel=quantities.axis_label("eta"), title=f"M = {source.strength:g}, h = {source.height:g}"
+    )
     plots.draw_legend(axes, loc="upper center", bbox_to_anchor=(0.5, -0.14))
 
 

@@ -1,9 +1,9 @@
 """The public names: where each is defined. This list is the only one; ``__init__.py`` reads it."""
 
+from .discretization.curve import Curve as Curve
+from .discretization.curve import meridian_from_points as meridian_from_points
 from .discretization.meridian import Disc as Disc
 from .discretization.meridian import disc as disc
-from .discretization.mesh_files import Curve as Curve
-from .discretization.mesh_files import meridian_from_points as meridian_from_points
 from .discretization.mesh_files import read_meridian as read_meridian
 from .discretization.mesh_files import write_meridian as write_meridian
 from .discretization.shapes import Annulus as Annulus
@@ -41,18 +41,18 @@ from .physics.sources import Uniform as Uniform
 from .physics.sources import Wire as Wire
 from .physics.tabulated import Tabulated as Tabulated
 from .potential import StrainEnergy as StrainEnergy
+from .results.branch import Branch as Branch
 from .results.citations import cite as cite
 from .results.convergence import Convergence as Convergence
 from .results.cost import Cost as Cost
 from .results.equilibria import Equilibria as Equilibria
+from .results.equilibrium import Equilibrium as Equilibrium
 from .results.error_estimate import Deviation as Deviation
 from .results.error_estimate import ErrorEstimate as ErrorEstimate
 from .results.folds import Cusp as Cusp
 from .results.folds import FoldCurve as FoldCurve
-from .results.records import Branch as Branch
-from .results.records import Equilibrium as Equilibrium
-from .results.records import Jump as Jump
-from .results.records import SpecialPoint as SpecialPoint
+from .results.special_point import Jump as Jump
+from .results.special_point import SpecialPoint as SpecialPoint
 from .results.store import load as load
 from .results.sweep import Sweep as Sweep
 from .results.verdict import Verdict as Verdict

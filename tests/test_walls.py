@@ -17,7 +17,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 #: each room may import those before it, in any way; what is left of the dot names a folder or a module
 ROOMS = (
-    ("checks", "errors", "memory", "threads"),
+    ("checks", "errors", "memory", "quantities", "threads"),
     ("files", "lock"),
     ("physics",),
     ("discretization",),

@@ -30,6 +30,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 import femmembrane as fm
+from femmembrane import quantities
 from femmembrane.accuracy.collocation import collocate
 from femmembrane.accuracy.shooting import shoot
 from femmembrane.accuracy.strong_form import Guess
@@ -93,7 +94,7 @@ def draw_pressures(curves: list[Curve], path: Path) -> None:
         axes.plot(z, c.printed(z), linestyle=(0, (5, 2)), color=color, label="eqs. (60) as printed" if label else None)
         heights, _ = c.fit(c.printed)
         axes.plot(heights, PRINTED[c.strength], marker, color=color, mfc="white", ms=6.5, label=f"paper's pressures, M = {c.strength}")
-    axes.set(xlabel=plots.HEIGHT_LABEL, ylabel=plots.PRESSURE_LABEL, xlim=(3.85, 5.3), ylim=(0.95, 2.08))
+    axes.set(xlabel=quantities.axis_label("center_height"), ylabel=quantities.axis_label("pressure"), xlim=(3.85, 5.3), ylim=(0.95, 2.08))
     axes.grid(color="0.9", linewidth=0.6)
     plots.draw_legend(axes, loc="lower left", fontsize=10)
     plots.save_figure(figure, path)

@@ -26,6 +26,7 @@ from printed_equations import as_printed
 from scipy.interpolate import CubicSpline
 
 import femmembrane as fm
+from femmembrane import quantities
 from femmembrane.views import plots
 
 STRENGTH = 400.0
@@ -59,7 +60,7 @@ def make(out: Path) -> Result:
         axes.set(title=f"({letter}) M = 400, h = {height:g}", ylim=(-1.05, 0.65), xlim=(0, 1.15))
         rows += compare(letter, height, poles, states, printed)
         check(height, coarse, printed, states)
-    panels[2].set(xlabel=plots.HEIGHT_LABEL, ylabel=plots.PRESSURE_LABEL)
+    panels[2].set(xlabel=quantities.axis_label("center_height"), ylabel=quantities.axis_label("pressure"))
     plots.draw_legend(panels[2], loc="upper right")
     paper.shared_legend(figure, panels[:2], 3)
     plots.save_figure(figure, out / "figure-8.png")

@@ -34,7 +34,8 @@ from ..solve.wellposed import ill_posed
 from .error_estimate import finer_space, same_state
 
 if TYPE_CHECKING:
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: from a scene with a mesh to the equilibria that are wanted, or a part of them
 Follow = Callable[[Scene], "Branch"]

@@ -1,7 +1,7 @@
 """The command ``femmembrane``: a scene file in, a folder of results out.
 
 Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
-full disk), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
+full disk, too little memory), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
 In a pipe nothing is printed but errors, one line each on stderr. There is one module a command. Slow imports stand inside its functions, so
 that ``--help`` answers at once.
 """
@@ -68,6 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return fail(BAD_INPUT, str(error))
     except OSError as error:
+        if _no_memory(error):
+            return fail(NOT_WRITTEN, _MEMORY % (error.strerror or error))
         try:
             sys.stdout.flush()
         except OSError:
@@ -75,6 +77,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if no_room(error):
             return fail(NOT_WRITTEN, f"results could not be written ({error.strerror or error}); make room")
         return fail(BAD_INPUT, str(error))
+    except Exception as error:
+        if not _no_memory(error):
+            raise
+        return fail(NOT_WRITTEN, _MEMORY % (str(error) or "it ran out"))
     except KeyboardInterrupt:
         return fail(INTERRUPTED, "interrupted; nothing was written")
     return code or DONE
+
+
+_MEMORY = "there is too little memory (%s); allow more, or ask for fewer elements"
+
+
+def _no_memory(error: BaseException) -> bool:
+    from ..memory import ran_out
+
+    return ran_out(error)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -13,7 +13,7 @@ from ..errors import InputError, unknown_name
 from .scenes import bundled
 
 if TYPE_CHECKING:
-    from ..results.records import Branch
+    from ..results.branch import Branch
     from ..scene import Scene
 
 
@@ -30,6 +30,9 @@ Changes = Annotated[
 
 def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = True) -> Scene:
     """The scene of a file, or a scene that comes with the package, by its name. Values of ``--set`` go before the values of the file."""
+    from ..memory import require_libraries
+
+    require_libraries()
     from ..scene import Scene, read_tables
 
     if not path.suffix and not path.exists():
@@ -108,11 +111,31 @@ def _remove_empty(folders: Iterable[Path]) -> None:
             folder.rmdir()
 
 
-def finished(folder: Path) -> Branch:
-    """The branch that a run left in a folder, or that was saved to a file."""
+def finished(folder: Path, facts: Mapping[str, Any] | None = None) -> Branch:
+    """The branch that a run left in a folder, or that was saved to a file.
+
+    Parameters
+    ----------
+    folder
+        The folder of the run, or the file.
+    facts
+        The record of the run, if the branch has to be that of this run.
+
+    Raises
+    ------
+    InputError
+        When there is no branch, when it cannot be read, and when it is not that of the run.
+    """
+    from ..memory import require_libraries
+
+    require_libraries()
+    from ..results.output import refuse_other_branch
     from ..results.store import load
 
     file = folder / "branch.nc" if folder.is_dir() else folder
     if not file.is_file():
         raise InputError("folder", str(folder), "the folder of a run (with its branch.nc) or a saved branch (.nc) is allowed")
-    return load(file)
+    branch = load(file)
+    if facts:
+        refuse_other_branch(branch, facts, folder)
+    return branch

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 
@@ -60,12 +60,15 @@ def observer(scene: Scene) -> AbstractContextManager[_Observer]:
 
 def _way(scene: Scene, equilibrium: Equilibrium) -> str:
     """How far an arc-length run has come."""
+    from ..quantities import words
+
     until = scene.run.until if scene.run is not None and scene.run.until else {}
-    return ", ".join(f"{name.replace('_', ' ')} {getattr(equilibrium, name):.4g} until {end:.4g}" for name, end in until.items())
+    return ", ".join(f"{words(name)} {getattr(equilibrium, name):.4g} until {end:.4g}" for name, end in until.items())
 
 
 def _line(equilibrium: Equilibrium) -> str:
+    from ..quantities import caption
     from ..results.analyses import remarks
 
     answers = [remark.terminal for remark in remarks(equilibrium) if remark.terminal]
-    return "  ".join([f"V = {equilibrium.volume:.4g}", f"P = {equilibrium.pressure:.4g}", *answers])
+    return "  ".join([caption(equilibrium.volume, equilibrium.pressure), *answers])

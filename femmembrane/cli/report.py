@@ -11,7 +11,7 @@ from .folders import finished
 from .outcome import DONE, say
 
 if TYPE_CHECKING:
-    from ..results.records import Branch
+    from ..results.branch import Branch
 
 
 def report(folder: Path, /, *, out: Path | None = None) -> int:
@@ -40,7 +40,8 @@ def write(folder: Path, out: Path | None = None) -> Path:
 
     inside = folder if folder.is_dir() else folder.parent
     facts = (read_record(folder) or {}) if folder.is_dir() else {}
-    branch = _without_equilibria(facts) if facts.get("equilibria") == 0 else finished(folder)
+    alone = facts.get("equilibria") == 0 and not (folder / "branch.nc").exists()
+    branch = _without_equilibria(facts) if alone else finished(folder, facts)
     page = inside / "report.html" if out is None else out
     remove_leftovers(page.parent)
     write_report(branch, page, facts)
@@ -49,7 +50,7 @@ def write(folder: Path, out: Path | None = None) -> Path:
 
 def _without_equilibria(facts: dict[str, Any]) -> Branch:
     """The branch of a run that found nothing and so left no other file."""
-    from ..results.records import Branch
+    from ..results.branch import Branch
     from ..scene import Scene
 
     try:

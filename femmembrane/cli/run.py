@@ -17,8 +17,9 @@ from .progress import observer
 from .report import write as write_report
 
 if TYPE_CHECKING:
+    from ..results.branch import Branch
     from ..results.checkpoint import Checkpoints
-    from ..results.records import Branch, Equilibrium
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 
@@ -92,7 +93,7 @@ def _ended(scene: Scene, out: Path) -> int | None:
     if facts["status"] == Status.INTERRUPTED:
         return None
     if facts["equilibria"]:
-        finished(out)  # damaged results are refused here, and not reported as done
+        finished(out, facts)  # results that are damaged, or of another run, are refused here, and not reported as done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)
@@ -126,7 +127,7 @@ def _compute(scene: Scene, interrupts: Interrupts, checkpoints: Checkpoints) -> 
 
 def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Status, message: str) -> Branch:
     """The branch of the equilibria found before the computation ended early. Special points are not searched for."""
-    from ..results.records import Branch
+    from ..results.branch import Branch
 
     used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
     asked = used.run

@@ -18,7 +18,7 @@ m_0 = 4 pi R0^3 sqrt(mu/mu0).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, overload
 
@@ -27,17 +27,9 @@ from numpy.typing import NDArray
 
 from ..checks import as_float, choice, is_number
 from ..errors import InputError
+from ..quantities import SI_UNITS
 from .magnetics import Dipole
 
-#: SI unit of every quantity
-UNITS: Mapping[str, str] = {
-    "length": "m",
-    "volume": "m^3",
-    "pressure": "Pa",
-    "stress": "Pa",
-    "energy": "J",
-    "dipole_strength": "A m^2",
-}
 #: relative difference up to which two numbers that say the same thing agree
 AGREEMENT = 1e-9
 
@@ -88,7 +80,7 @@ class Scales:
             if not (is_number(value) and as_float(value) > 0):  # of any size: what follows from them is what counts
                 raise InputError(f"scales.{name}", value, f"a finite number > 0 is allowed (in {unit[name]})")
             object.__setattr__(self, name, float(value))
-        for quantity in UNITS.keys() - {"dipole_strength"}:
+        for quantity in SI_UNITS.keys() - {"dipole_strength"}:
             self._unit(quantity)
         self._in_range("radius over thickness", self.radius_to_thickness)
         if self.dipole_moment is not None:
@@ -127,7 +119,7 @@ class Scales:
             For an unknown quantity.
         """
         _check_quantity(quantity)
-        return UNITS[quantity]
+        return SI_UNITS[quantity]
 
     @overload
     def to_si(self, quantity: str, value: float) -> float: ...
@@ -218,7 +210,7 @@ class Scales:
 
 
 def _check_quantity(quantity: Any) -> None:
-    choice("quantity", quantity, UNITS)
+    choice("quantity", quantity, SI_UNITS)
 
 
 def _values(quantity: str, value: Any) -> Array:

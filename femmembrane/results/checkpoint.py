@@ -21,7 +21,7 @@ from .table import columns, reader
 
 if TYPE_CHECKING:
     from ..scene import Scene
-    from .records import Branch
+    from .branch import Branch
 
 NAME = "checkpoint.nc"
 #: seconds of work that may be lost, unless saving takes long
@@ -130,11 +130,20 @@ def refuse_others(asked: Scene, kept: Mapping[str, Any], key: str) -> None:
     here, there = (dict(_flat(tables)) for tables in (asked.to_dict(), kept))
     if asked.open and here.get("mesh.accuracy") == there.get("mesh.accuracy"):  # the mesh that was chosen for it
         here, there = ({k: v for k, v in keys.items() if not k.startswith("mesh.")} for keys in (here, there))
-    differing = [name for name in sorted(here.keys() | there.keys()) if here.get(name) != there.get(name)]
-    if differing:
-        words = "; ".join(f"{name} is {_word(here, name)}, was {_word(there, name)}" for name in differing)
+    words = _difference(here, there)
+    if words:
         advice = "go on with the scene it was begun with, choose another folder, or start over"
         raise InputError(key, asked.title or "this scene", f"the run to be resumed has another scene: {words}; {advice}")
+
+
+def scene_difference(asked: Mapping[str, Any], kept: Mapping[str, Any]) -> str:
+    """All that differs between two scenes, given by their tables; empty where nothing does."""
+    return _difference(dict(_flat(asked)), dict(_flat(kept)))
+
+
+def _difference(here: Mapping[str, Any], there: Mapping[str, Any]) -> str:
+    differing = [name for name in sorted(here.keys() | there.keys()) if here.get(name) != there.get(name)]
+    return "; ".join(f"{name} is {_word(here, name)}, was {_word(there, name)}" for name in differing)
 
 
 def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..origin import package_version
 
 if TYPE_CHECKING:
-    from .records import Branch
+    from .branch import Branch
 
 _ENTRIES = {
     "saxena2019": """@article{saxena2019,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..errors import unknown_name
 from ..files import write_csv
+from ..quantities import heading
 from . import door
-from .quantities import heading
 
 if TYPE_CHECKING:
     import pandas
@@ -33,20 +33,13 @@ RESOLVED = 10.0
 #: round-off of a converged quantity, relative to its size
 ROUND_OFF = 16 * np.finfo(float).eps
 
-#: what is compared, and its heading in the table
-HEADINGS: Mapping[str, str] = {
-    **{name: heading(name) for name in ("pressure", "volume", "center_height")},
-    "elastic_energy": "E elastic",
-    "magnetic_energy": "E magnetic",
-    "energy": "E total",
-    "lambda_pressure": "lambda (P)",
-    "lambda_volume": "lambda (V)",
-    "profile_l2": "profile L2",
-    "profile_h1": "profile H1",
-    "limit_pressure": "limit P",
-    "limit_volume": "limit V",
-}
 PROFILES = ("profile_l2", "profile_h1")
+#: what is compared, in the order of the table
+COMPARED = (
+    *("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "energy", "lambda_pressure", "lambda_volume"),
+    *PROFILES,
+    *("limit_pressure", "limit_volume"),
+)
 COLUMNS = (
     *("degree", "elements", "unknowns", "element_size", "quantity", "value", "reference", "error", "floor", "resolved", "order"),
     *("extrapolated", "extrapolated_error"),
@@ -206,7 +199,7 @@ class Convergence:
     def __str__(self) -> str:
         names = [q for q in self.errors if q not in ("elastic_energy", "magnetic_energy")]
         lines = [self.scene.title] if self.scene.title else []
-        lines += [f"{HEADINGS[self.control]} = {self.load:.9g}; relative errors and observed orders", _line("deg", "elem", "unkn.", names)]
+        lines += [f"{heading(self.control)} = {self.load:.9g}; relative errors and observed orders", _line("deg", "elem", "unkn.", names)]
         for i, degree in enumerate(self.degrees):
             for k, n in enumerate(self.elements):
                 lines.append(f"{degree:>3} {n:>5} {self.unknowns[i, k]:>6}" + "".join(self._cell(q, i, k) for q in names))
@@ -226,7 +219,7 @@ class Convergence:
     def _summary(self, quantity: str) -> str:
         shown = [_with_error(self.reference[quantity], self.floors[quantity] * self.scale[quantity])]
         shown += [_with_error(value, error) for value, error in zip(*self.extrapolated(quantity), strict=True)]
-        return f"{HEADINGS[quantity]:<12} {shown[0]:<28}" + "".join(f"  {text:<26}" for text in shown[1:])
+        return f"{heading(quantity):<12} {shown[0]:<28}" + "".join(f"  {text:<26}" for text in shown[1:])
 
     def _of(self, table: Mapping[str, Array], quantity: str) -> Array:
         if quantity not in table:
@@ -243,7 +236,7 @@ def _with_error(value: float, error: float) -> str:
 
 
 def _line(degree: str, elements: str, unknowns: str, names: Sequence[str]) -> str:
-    return f"{degree:>3} {elements:>5} {unknowns:>6}" + "".join(f"{HEADINGS[q]:>13} " for q in names)
+    return f"{degree:>3} {elements:>5} {unknowns:>6}" + "".join(f"{heading(q):>13} " for q in names)
 
 
 def observed_orders(errors: Array, elements: Sequence[int]) -> Array:

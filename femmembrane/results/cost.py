@@ -11,9 +11,8 @@ import numpy as np
 
 from .. import files
 from ..errors import unknown_name
-from ..solve.controls import CONTROLS
+from ..quantities import heading
 from . import door
-from .quantities import heading
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -204,7 +203,7 @@ def _number(value: Any, form: str, width: int) -> str:
 def _text(study: Cost) -> Iterator[str]:
     letter = heading(study.quantity)
     reference = study.reference
-    at = f"{CONTROLS[study.control].symbol} = {study.load:.9g}"
+    at = f"{heading(study.control)} = {study.load:.9g}"
     yield f"One equilibrium at {at}: relative error in {letter} and milliseconds (* nothing is better in both)"
     yield (
         f"reference: {letter} = {reference.value:.15g}, {reference.elements} elements of degree {reference.degree}, "

@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
     from ..stability.profile import Profile
+    from .branch import Branch
     from .convergence import Convergence
     from .cost import Cost
+    from .equilibrium import Equilibrium
     from .error_estimate import ErrorEstimate
     from .folds import FoldCurve
-    from .records import Branch, Equilibrium
     from .sweep import Sweep
     from .verdict import Verdict
     from .vibration import Vibration

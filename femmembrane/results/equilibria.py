@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from .records import Equilibrium
+from ..quantities import PLACES, words, written
+from .equilibrium import Equilibrium
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +43,10 @@ class Equilibria(Sequence[Equilibrium]):
 
     def __str__(self) -> str:
         lines = [f"{len(self)} equilibria at {self.control} {self.load:.9g}; {self.searched}"]
-        lines.append(f"{'energy':>14} {'volume':>12} {'pressure':>12} {'pole height':>12}  {'under pressure':<14}  {'under volume':<14}")
+        places = " ".join(f"{words(name):>12}" for name in PLACES)
+        lines.append(f"{'energy':>14} {places}  {'under pressure':<14}  {'under volume':<14}")
         for energy, eq in zip(self.energies, self.found, strict=True):
-            words = f"{eq.verdict('pressure').word:<14}  {eq.verdict('volume').word:<14}"
-            lines.append(f"{energy:>14.8g} {eq.volume:>12.6g} {eq.pressure:>12.8g} {eq.center_height:>12.6g}  {words}".rstrip())
+            verdicts = f"{eq.verdict('pressure').word:<14}  {eq.verdict('volume').word:<14}"
+            numbers = " ".join(written(name, getattr(eq, name), 12) for name in PLACES)
+            lines.append(f"{written('energy', energy, 14)} {numbers}  {verdicts}".rstrip())
         return "\n".join(lines)

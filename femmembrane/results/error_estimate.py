@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ..quantities import words
 from ..solve.controls import CONTROLS, control_kind
 
 
@@ -75,7 +76,7 @@ class ErrorEstimate:
         lines = [f"at the same {CONTROLS[self.control].words}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
         for name in ESTIMATED:
             d: Deviation = getattr(self, name)
-            lines.append(f"{name.replace('_', ' '):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
+            lines.append(f"{words(name):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
         return "\n".join(lines + ([self.reason] if self.reason else []))
 
 

@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Status
+from ..quantities import heading, words
 from . import door
-from .records import Equilibrium, SpecialPoint
+from .equilibrium import Equilibrium
+from .special_point import SpecialPoint
 
 Array = NDArray[np.float64]
 
 
+_COLUMNS = ("pressure", "volume", "center_height")
 FOLD_NAMES = {"limit_point": "limit point (dP = 0)", "volume_fold": "volume fold (dV = 0)"}
 
 
@@ -82,20 +85,19 @@ class FoldCurve:
 
     def __str__(self) -> str:
         width = max(14, len(self.parameter))
-        lines = [FOLD_NAMES[self.kind], f"{self.parameter:>{width}} {'pressure':>14} {'volume':>14} {'pole height':>14}"]
-        rows = zip(self.values, self.pressure, self.volume, self.center_height, strict=True)
-        lines += [f"{m:>{width}.8g} {p:>14.9g} {v:>14.9g} {w:>14.9g}" for m, p, v, w in rows]
+        lines = [FOLD_NAMES[self.kind], f"{self.parameter:>{width}} " + " ".join(f"{words(name):>14}" for name in _COLUMNS)]
+        rows = zip(self.values, *(getattr(self, name) for name in _COLUMNS), strict=True)
+        lines += [f"{m:>{width}.8g} " + " ".join(f"{place:>14.9g}" for place in places) for m, *places in rows]
         for c in self.cusps:
-            lines.append(f"{c.kind.replace('_', ' ')} at {self.parameter} = {c.value:.10g}: P = {c.pressure:.9g}, V = {c.volume:.9g}")
+            where = ", ".join(f"{heading(name)} = {getattr(c, name):.9g}" for name in ("pressure", "volume"))
+            lines.append(f"{c.kind.replace('_', ' ')} at {self.parameter} = {c.value:.10g}: {where}")
         return "\n".join(lines + ([self.message] if self.message else []))
 
     def to_dataframe(self) -> Any:
         """The curve as a pandas DataFrame: a column named like the parameter, then pressure, volume and center_height."""
         import pandas
 
-        return pandas.DataFrame(
-            {self.parameter: self.values, "pressure": self.pressure, "volume": self.volume, "center_height": self.center_height}
-        )
+        return pandas.DataFrame({self.parameter: self.values, **{name: getattr(self, name) for name in _COLUMNS}})
 
     def plot(self, path: str | PathLike[str] | None = None) -> Any:
         """Pressure and volume of the fold against the number as a Matplotlib figure.

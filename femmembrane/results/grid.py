@@ -12,37 +12,48 @@ import numpy as np
 
 from ..errors import InputError
 from ..origin import package_version
+from ..quantities import PLACES, quantity
 from .netcdf import read_dataset, reason, write_dataset
 
 if TYPE_CHECKING:
     import xarray
 
-_PLACES = {"volume": "enclosed volume V/R0^3", "pressure": "pressure P = p R0/(mu T)", "center_height": "height of the pole over R0"}
-#: dimensions along which a scene has several values, and what each counts
+#: dimension along which a scene has several values, what lies there, and which of them
 _FAMILIES = {
-    "": ("step", "equilibrium", "along the branch"),
+    "": ("step", "step", "along the branch"),
     "limit_": ("limit_point", "limit point", "of the limit points along the branch (dP = 0)"),
     "fold_": ("fold", "volume fold", "of the volume folds along the branch (dV = 0)"),
-    "onset_": ("onset", "azimuthal onset", "where an azimuthal instability sets in or ends"),
-    "state_": ("state", "state", "of the equilibria at the load, by increasing energy"),
+    "onset_": ("onset", "onset", "where an azimuthal instability sets in or ends"),
+    "state_": ("state", "equilibrium", "of the equilibria at the load, by increasing energy"),
 }
-#: dimension (if a scene has several values) and long name of every variable; all of them are non-dimensional
-MEANING: Mapping[str, tuple[str, str]] = {
-    **{f"{tag}{name}": (dim, f"{what} {where}") for tag, (dim, _, where) in _FAMILIES.items() for name, what in _PLACES.items()},
-    "steps": ("", "number of equilibria along the branch"),
-    "limit_points": ("", "number of limit points"),
-    "volume_folds": ("", "number of volume folds"),
-    "azimuthal_onsets": ("", "number of azimuthal onsets"),
-    "onset_waves": ("onset", "number of waves around the axis of the onsets"),
-    "wrinkled_fraction": ("step", "part of the reference area that is wrinkled, along the branch"),
-    "largest_wrinkled_fraction": ("", "largest part of the reference area that is wrinkled on the branch"),
-    "equilibria": ("", "number of equilibria at the load that were found"),
-    "stable_equilibria": ("", "number of them that are stable under the load's control and against the waves asked for"),
-    "state_energy": ("state", "energy that orders the equilibria, over mu T R0^2"),
-    "state_stable": ("state", "whether each equilibrium is stable (1 or 0)"),
-    "upright_at_start": ("", "whether the branch starts stable against one wave around the axis (1 or 0)"),
-    "outcome": ("", "whether and where the onset was met"),
+#: dimension of every variable of which a scene has several values, empty for one
+DIMENSIONS: Mapping[str, str] = {
+    **{f"{tag}{name}": dim for tag, (dim, _, _) in _FAMILIES.items() for name in PLACES},
+    **dict.fromkeys(("steps", "limit_points", "volume_folds", "azimuthal_onsets"), ""),
+    "onset_waves": "onset",
+    "wrinkled_fraction": "step",
+    **dict.fromkeys(("largest_wrinkled_fraction", "equilibria", "stable_equilibria"), ""),
+    "state_energy": "state",
+    "state_stable": "state",
+    "upright_at_start": "",
+    "outcome": "",
 }
+
+
+def place_of_variable(name: str) -> tuple[str, str]:
+    """Of a variable that holds where equilibria or special points lie: its quantity, and what lies there; empty for others."""
+    for tag, (_, what, _) in _FAMILIES.items():
+        if name.removeprefix(tag) in PLACES and name.startswith(tag):
+            return name.removeprefix(tag), what
+    return "", ""
+
+
+def _meaning(name: str) -> str:
+    """What a variable holds: a place with whose it is, or a quantity of its own."""
+    for tag, (_, _, where) in _FAMILIES.items():
+        if name.startswith(tag) and name.removeprefix(tag) in PLACES:
+            return f"{quantity(name.removeprefix(tag)).meaning} {where}"
+    return quantity(name).meaning
 
 
 class Row(Protocol):
@@ -66,10 +77,10 @@ def dataset_of(over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: 
     import xarray
 
     shape, dims = tuple(len(values) for values in over.values()), tuple(over)
-    names = sorted({name for row in rows for name in row.values}, key=list(MEANING).index)
+    names = sorted({name for row in rows for name in row.values}, key=list(DIMENSIONS).index)
     variables: dict[str, Any] = {}
     for name in names:
-        values, (dim, meaning) = [row.values.get(name) for row in rows], MEANING[name]
+        values, dim = [row.values.get(name) for row in rows], DIMENSIONS[name]
         series = any(isinstance(v, np.ndarray) for v in values)
         data = (
             _stacked(values)
@@ -78,7 +89,7 @@ def dataset_of(over: Mapping[str, tuple[Any, ...]], rows: Sequence[Row], facts: 
             if name == "outcome"
             else np.array([np.nan if v is None else v for v in values], float)
         )
-        about = {"long_name": meaning, "units": "1"}
+        about = {"long_name": _meaning(name), "units": "1"}
         variables[name] = (*dims, dim) if series else dims, data.reshape(shape + data.shape[1:]), about
     variables["status"] = dims, _text([r.status for r in rows]).reshape(shape), {"long_name": "how the computation of the scene ended"}
     variables["message"] = dims, _text([r.message for r in rows]).reshape(shape), {"long_name": "the reason, or what was done"}

@@ -8,7 +8,7 @@ import json
 import os
 import platform
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -20,12 +20,13 @@ from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version
 from . import door
 from .analyses import asked, registered
+from .checkpoint import scene_difference
 from .netcdf import reason
 from .store import save
 from .table import write_csv, write_special_points_csv
 
 if TYPE_CHECKING:
-    from .records import Branch
+    from .branch import Branch
 
 #: the record of a run, which makes its folder complete
 RECORD = "run.json"
@@ -112,6 +113,30 @@ def read_record(folder: Path) -> dict[str, Any] | None:
         raise InputError("folder", str(path), f"the run.json of a run is needed ({reason(error)})") from None
     facts.pop("digest", None)
     return dict(facts)
+
+
+def refuse_other_branch(branch: Branch, facts: Mapping[str, Any], folder: Path) -> None:
+    """Refuse the branch of a folder whose record is of another run.
+
+    Parameters
+    ----------
+    branch : Branch
+        As ``branch.nc`` has it.
+    facts : mapping
+        As ``run.json`` has them.
+
+    Raises
+    ------
+    InputError
+        Naming all that differs in the scene; where the scene is the same, that it is another run of it.
+    """
+    differing = scene_difference(branch.scene.to_dict(), facts["scene"])
+    # wall times are those of one run alone
+    own = {"status": branch.status.value, "message": branch.message, "equilibria": len(branch), "timings": dict(branch.timings)}
+    if not differing and all(facts.get(name, value) == value for name, value in own.items()):
+        return
+    what = f"its branch.nc has another scene than its run.json: {differing}" if differing else "its branch.nc and run.json are of two runs"
+    raise InputError("folder", str(folder), f"{what}; the files of one run are allowed, or branch.nc alone")
 
 
 def _check_record(facts: dict[str, Any]) -> None:

@@ -19,11 +19,10 @@ from ..discretization.meridian import side
 from ..errors import InputError, Status
 from ..origin import package_version
 from ..scene import Scene
-from .analyses import asked, own_quantity, typed_column
+from .analyses import asked, known_quantity, typed_column
 from .analyses.base import Variable
+from .branch import Branch
 from .netcdf import read_dataset, reason, write_dataset
-from .quantities import QUANTITIES
-from .records import Branch
 from .stored_points import (
     LIMIT,
     SPECIAL,
@@ -160,9 +159,8 @@ def _profile_variables(branch: Branch) -> dict[str, Variable]:
 def _describe(name: str) -> dict[str, str]:
     prefix = next((p for p in (SPECIAL, LIMIT) if name.startswith(p)), "")
     base = name.removeprefix(prefix).removeprefix("equilibrium_")
-    known = own_quantity(base) or QUANTITIES.get(base)
-    meaning, unit = (base, "1") if known is None else (known.meaning, known.unit)
-    return {"long_name": meaning if base == name else f"{meaning}, at the special point", "units": unit}
+    known = known_quantity(base)
+    return {"long_name": known.meaning if base == name else f"{known.meaning}, at the special point", "units": known.unit}
 
 
 def _attributes(branch: Branch) -> dict[str, Any]:

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Status
+from ..quantities import typed
 from ..scene.variation import Parameter
 from .analyses.base import Variable
-from .quantities import typed
-from .records import Equilibrium, Jump, PathMemory, SpecialPoint, TraceMemory
+from .equilibrium import Equilibrium
+from .path_memory import PathMemory, TraceMemory
+from .special_point import Jump, SpecialPoint
 
 if TYPE_CHECKING:
     import xarray

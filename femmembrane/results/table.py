@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     import pandas
 
     from ..scene import Scene
-    from .records import Branch, Equilibrium, SpecialPoint
+    from .branch import Branch
+    from .equilibrium import Equilibrium
+    from .special_point import SpecialPoint
 
 SPECIAL_POINT_COLUMNS = ("kind", "volume", "pressure", "center_height", "error")
 #: what every scene has at the end of its tables

@@ -6,7 +6,6 @@ from .analysis import WRINKLING as WRINKLING
 from .analysis import Analysis as Analysis
 from .analysis import Perturbations as Perturbations
 from .run import MAX_STEPS as MAX_STEPS
-from .run import QUANTITIES as QUANTITIES
 from .run import Run as Run
 from .toml import read_tables as read_tables
 from .value import MAX_DEGREE as MAX_DEGREE

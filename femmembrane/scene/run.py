@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..checks import choice, number, sequence, sign, store, whole
 from ..errors import InputError
+from ..quantities import PLACES
 
 #: words of [run].control, and the public name of the quantity that each prescribes; arc length prescribes none
 PRESCRIBED = {"volume": "volume", "pressure": "pressure", "height": "center_height"}
@@ -19,8 +20,6 @@ CONTROLS = (*PRESCRIBED, "arc-length")
 MINIMISED = ("volume", "pressure")
 AT_LIMIT = ("stop", "jump")
 SOLVERS = ("ipopt", "newton")
-#: quantities in which an arc-length run may end
-QUANTITIES = tuple(PRESCRIBED.values())
 #: equilibria of a run, which has to keep them all
 MAX_STEPS = 10**6
 _MAX_STEPS = 400
@@ -168,9 +167,7 @@ def _loads(key: str, values: Any) -> tuple[float, ...]:
 
 def _target(key: str, value: Any) -> Target:
     if not isinstance(value, Mapping) or len(value) != 1:
-        raise InputError(
-            key, value, "one quantity and its value are allowed, such as {center_height = 5.0}; known: " + ", ".join(QUANTITIES)
-        )
+        raise InputError(key, value, "one quantity and its value are allowed, such as {center_height = 5.0}; known: " + ", ".join(PLACES))
     ((quantity, end),) = value.items()
-    choice(key, quantity, QUANTITIES)
+    choice(key, quantity, PLACES)
     return Target(quantity, number(f"{key}.{quantity}", end))

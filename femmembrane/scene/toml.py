@@ -32,8 +32,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..checks import choice, sequence
+from ..discretization.curve import Curve
 from ..discretization.meridian import Disc, Meridian
-from ..discretization.mesh_files import Curve, read_meridian
+from ..discretization.mesh_files import read_meridian
 from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
 from ..physics.along import Along

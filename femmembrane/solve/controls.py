@@ -18,6 +18,7 @@ import numpy as np
 from ..checks import choice, convert
 from ..discretization.space import Space
 from ..potential import Array, Evaluation
+from ..quantities import heading
 from ..scene.run import MINIMISED, PRESCRIBED
 
 
@@ -145,11 +146,22 @@ class Gas:
         return dp * total + absolute * float(evaluation.volume_gradient @ dx)
 
     def rest(self, space: Space) -> float:
-        """The amount that holds the undeformed membrane."""
+        """The amount that holds the undeformed membrane.
+
+        Parameters
+        ----------
+        space : Space
+        """
         return self.atmosphere * (space.reference_volume + self.chamber)
 
     def refusal(self, pressure: float, volume: float) -> str:
-        """Why no amount of the gas holds a state with this pressure and volume; empty where one does."""
+        """Why no amount of the gas holds a state with this pressure and volume; empty where one does.
+
+        Parameters
+        ----------
+        pressure, volume : float
+            Of the state.
+        """
         if (pressure + self.atmosphere) * (volume + self.chamber) > 0 and volume > -self.chamber:
             return ""
         return "the start does not compress the gas (P + atmosphere <= 0); start at a larger volume"
@@ -224,10 +236,21 @@ class Controlled(Protocol):
         """
 
     def rest(self, space: Space, /) -> float:
-        """The number in the undeformed membrane."""
+        """The number in the undeformed membrane.
+
+        Parameters
+        ----------
+        space : Space
+        """
 
     def refusal(self, pressure: float, volume: float) -> str:
-        """Why no load of the control holds a state with this pressure and volume; empty where one does."""
+        """Why no load of the control holds a state with this pressure and volume; empty where one does.
+
+        Parameters
+        ----------
+        pressure, volume : float
+            Of the state.
+        """
 
 
 @dataclass(frozen=True)
@@ -238,8 +261,6 @@ class ControlKind:
     ----------
     name : str
         Public name: argument of the verbs, attribute of an equilibrium, column of a branch, key of :attr:`.Space.units`.
-    symbol : str
-        How messages and tables write it.
     at : callable
         The control that holds it at a load.
     value : callable
@@ -251,11 +272,15 @@ class ControlKind:
     """
 
     name: str
-    symbol: str
     at: Callable[[float], Control]
     value: Callable[[Space, Array, float, float], float]
     rate: Callable[[Space, float, Evaluation, Array, float], float]
     rest: Callable[[Space], float]
+
+    @property
+    def symbol(self) -> str:
+        """How messages and tables write it."""
+        return heading(self.name)
 
     @property
     def words(self) -> str:
@@ -287,7 +312,6 @@ CONTROLS: Mapping[str, ControlKind] = {
     for kind in (
         ControlKind(
             "volume",
-            "V",
             VolumeControl,
             value=lambda space, x, pressure, volume: volume,
             rate=lambda space, pressure, evaluation, dx, dp: float(evaluation.volume_gradient @ dx),
@@ -295,7 +319,6 @@ CONTROLS: Mapping[str, ControlKind] = {
         ),
         ControlKind(
             "pressure",
-            "P",
             PressureControl,
             value=lambda space, x, pressure, volume: pressure,
             rate=lambda space, pressure, evaluation, dx, dp: dp,
@@ -303,7 +326,6 @@ CONTROLS: Mapping[str, ControlKind] = {
         ),
         ControlKind(
             "center_height",
-            "pole height",
             CenterHeightControl,
             value=lambda space, x, pressure, volume: space.center_height(x),
             rate=_pole_rate,

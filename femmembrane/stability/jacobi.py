@@ -39,7 +39,7 @@ from ..threads import one_thread
 from .second_variation import LocalResponse, local_response
 
 if TYPE_CHECKING:
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
 
 FORMS = ("corrected", "printed")
 

@@ -16,6 +16,7 @@ from ..physics.scales import Scales
 from ..physics.sheet import Sheet
 from ..physics.stress import total_stress
 from ..physics.tension_field import strain_energy
+from ..quantities import quantity, si_values
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ class Profile:
             "total_stress_2": self.total[1],
         }
         if scales is not None:
-            columns |= {f"{name}_pa": scales.to_si("stress", columns[name]) for name in list(columns) if "stress" in name}
+            columns |= si_values({name: values for name, values in columns.items() if quantity(name).si == "stress"}, scales)
         return columns
 
 

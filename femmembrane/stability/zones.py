@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from ..checks import choice
 from ..discretization.space import Space, space_of_scene
 from ..potential import potential_of
-from ..results.records import Branch, Equilibrium
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
 from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
 from ..solve.finer_space import confirmed

@@ -10,8 +10,8 @@ from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, profile_norms
 from ..checks import only, switch
 from ..errors import SolveError, Status
 from ..potential import Array, potential_of
-from ..results.convergence import HEADINGS, PROFILES, ROUND_OFF, Convergence
-from ..results.records import Equilibrium
+from ..results.convergence import COMPARED, PROFILES, ROUND_OFF, Convergence
+from ..results.equilibrium import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CONTROLS, Control, control_kind
 from ..solve.finer_space import transferred
@@ -125,7 +125,7 @@ class _Study:
         self.scene, self.name, self.control, self.degrees, self.elements = scene, name, control, degrees, elements
         self.traced: tuple[float, float] | None = None
         self.limit_points = limit_points
-        known = [q for q in HEADINGS if q not in PROFILES and (limit_points or not q.startswith("limit_"))]
+        known = [q for q in COMPARED if q not in PROFILES and (limit_points or not q.startswith("limit_"))]
         self.quantities = [q for q in known if q != name and (scene.sources or q != "magnetic_energy")]
 
     def run(self, scene: Scene, load: float, found: Equilibrium) -> Convergence:
@@ -146,7 +146,7 @@ class _Study:
                 errors[q][place] = abs(value - reference[q]) / scale[q]
             for q, norm in zip(PROFILES, _difference(eq, fine), strict=True):
                 errors[q][place] = norm / scale[q]
-        ordered = {q: errors[q] for q in HEADINGS if q in errors}
+        ordered = {q: errors[q] for q in COMPARED if q in errors}
         meshes = [self.scene.mesh.with_elements(n) for n in self.elements]
         return Convergence(
             scene=scene,

@@ -22,8 +22,9 @@ from ..errors import InputError, SolveError, unknown_name
 from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version, processor
 from ..potential import potential_of
+from ..results.branch import Branch
 from ..results.cost import STARTS, Cost, Measurement
-from ..results.records import Branch, Equilibrium
+from ..results.equilibrium import Equilibrium
 from ..results.store import save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene
@@ -69,33 +70,35 @@ def cost(
 ) -> Cost:
     """Error against wall time of one equilibrium, by every method on every mesh.
 
-    Finite elements of every degree on every mesh by every solver, *warm* (the next load step of a branch, predicted from the two states
-    before it) and *cold* (as :func:`femmembrane.equilibrium` does without ``start``: inflated without sources, which are then turned on;
-    that is Newton's work, and a cold IPOPT confirms it). Beside them, warm, the methods of :mod:`femmembrane.accuracy`, from a straight
-    line through the same two states. Times are wall times of one process on one thread, taken in turns; compare them with each other
-    rather than with those of another machine. The right-hand sides of shooting are interpreted, one radius at a time: compiled ones would
-    be faster, and the number of them is there to say by how much.
+    Finite elements of every degree are measured on every mesh with every solver, warm and cold. *Warm* is the next load step of a branch,
+    predicted from the two states before it. *Cold* is :func:`femmembrane.equilibrium` without ``start``: the membrane is inflated without
+    sources, and these are then turned on. Newton's method does this work, and a cold IPOPT confirms it.
+
+    The methods of :mod:`femmembrane.accuracy` are measured warm, from a straight line through the same two states. The right-hand sides of
+    shooting are interpreted, one radius at a time. Compiled ones would be faster; their number is in the table.
+
+    Times are wall times of one process on one thread, taken in turns. Compare them with each other rather than with another machine's.
 
     Parameters
     ----------
     scene : Scene
-        Its own mesh is that of the stages and effects.
+        Stages and effects are measured on its own mesh.
     volume, pressure, center_height : float
-        Exactly one of them. A height is held by no minimiser: IPOPT is then left out.
+        Exactly one of them. No minimiser holds a height: IPOPT is then left out.
     degrees, elements : sequence of int
-        Degrees from 1 to 8 and numbers of elements, every one with every one.
+        Degrees from 1 to 8 and numbers of elements; every degree is combined with every number.
     solvers : sequence of {"newton", "ipopt"}
     starts : sequence of {"warm", "cold"}
     methods : sequence of {"shooting", "collocation", "published"}, optional
-        Default all of them, or none for a tension field or another shape than the disc, which they do not solve.
+        Default: all of them, or none for a tension field or another shape than the disc, which they do not solve.
     tolerances : mapping of str to sequence of float
-        Those at which each method is measured.
+        Tolerances at which each method is measured.
     repeat : int
-        Medians are of so many times.
+        Number of times that a median is taken over.
     budget : float
         Seconds after which one piece of work is not repeated.
     step : float, optional
-        Load step; default a sixtieth of the load.
+        Load step. Default: a sixtieth of the load.
     reference_elements : int
         Elements of degree 8 of the reference.
     parts : bool
@@ -254,7 +257,7 @@ def _job(line: Measurement, name: str, act: Callable[[], Any]) -> Job:
 
 
 def _effects(course: Course) -> list[Job]:
-    """One load step by Newton with its record, without and with each effect, everything else as in the scene."""
+    """One load step by Newton's method with its record, without and with each effect. Everything else is as in the scene."""
     plain = course.scene.replace(run=None, analysis=Analysis(), tension_field=False)
     modes = course.scene.analysis.azimuthal_modes or (1,)
     pairs: dict[str, tuple[Scene, Scene]] = {}

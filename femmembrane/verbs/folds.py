@@ -11,8 +11,9 @@ import numpy as np
 from ..checks import sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Evaluation, Family, Potential, potential_of
+from ..results.equilibrium import Equilibrium
 from ..results.folds import Cusp, FoldCurve
-from ..results.records import Equilibrium, SpecialPoint
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..scene.variation import Parameter
 from ..solve import state_resolution, wellposed
@@ -49,8 +50,8 @@ def fold_curve(
 ) -> FoldCurve:
     """Follow a limit point or a volume fold while a number of the scene changes.
 
-    The curve is followed by arc length in displacement, pressure and number (the number in units of the width of ``bounds``), so that it
-    passes the points where two folds merge and comes back on the other one.
+    The curve is followed by arc length in displacement, pressure and number, the number in units of the width of ``bounds``. So it passes
+    the points where two folds merge: it arrives along one fold and leaves along the other.
 
     Parameters
     ----------
@@ -59,17 +60,17 @@ def fold_curve(
     start : SpecialPoint
         Of kind limit_point or volume_fold, from :func:`femmembrane.trace`.
     parameter : str
-        ``source.K.strength``, ``source.K.height`` (K from 0), ``membrane.susceptibility``, or a number of the material. For Ogden's:
-        ``material.mu.K``, where the other moduli are scaled by one factor, and ``material.alpha.K``, where mu_K alpha_K stays, so that
-        the sum of mu alpha stays 2.
+        ``source.K.strength``, ``source.K.height`` (K from 0), ``membrane.susceptibility``, or a number of the material. Ogden's material
+        has ``material.mu.K`` and ``material.alpha.K``, and the sum of mu alpha stays 2: with ``mu`` the other moduli are scaled by one
+        factor, with ``alpha`` the product mu_K alpha_K stays.
     bounds : (float, float)
         Smallest and largest value; the last point lies exactly on the bound that is met.
     direction : {1, -1}
         1 sets out towards larger values.
     max_steps : int
-        Most steps.
+        Most steps along the curve.
     steps : StepControl, optional
-        Lengths and accuracy of the steps; default those of a trace, but none longer than 0.1.
+        Lengths and accuracy of the steps. Default: as for a trace, but no step is longer than 0.1.
     ill_posed : {"stop", "mark"}
         What to do where the meridional stress is compressive, as for :func:`femmembrane.trace`.
     throw : bool
@@ -82,7 +83,18 @@ def fold_curve(
     Raises
     ------
     InputError, SolveError
-        The latter carries the curve up to the failure as ``result``.
+        A SolveError carries the curve up to the failure as ``result``.
+
+    Examples
+    --------
+    The limit point of a Mooney-Rivlin disc, as the material becomes neo-Hookean:
+
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.MooneyRivlin(0.05), mesh=fm.disc(8))
+    >>> limit = fm.trace(scene, until={"volume": 10.0}).special_points[0]
+    >>> curve = fm.fold_curve(scene, start=limit, parameter="material.ratio", bounds=(0.0, 0.06), direction=-1)
+    >>> print(f"P = {curve.pressure[0]:.4f} at {curve.values[0]:.2f}, P = {curve.pressure[-1]:.4f} at {curve.values[-1]:.2f}")
+    P = 2.1605 at 0.05, P = 1.8792 at 0.00
     """
     check_scene(scene)
     named = Parameter(scene, parameter)

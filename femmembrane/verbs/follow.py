@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from ..checks import number, only
 from ..errors import InputError, SolveError
+from ..results.branch import Branch
 from ..results.checkpoint import same_scene
-from ..results.records import Branch, Equilibrium
+from ..results.equilibrium import Equilibrium
 from ..scene import Scene
 from ..solve.controls import CONTROLS, Controlled, Gas, control_kind
 from ..threads import one_thread
@@ -41,12 +42,12 @@ def inflate(
     volumes : array_like
         Enclosed volumes over R0^3 (with the 2 pi), signed.
     start : Equilibrium, optional
-        A neighbour to start from; default: inflated without sources, which are then turned on at the first volume.
+        A neighbour to start from. Default: the membrane is inflated without sources, and these are turned on at the first volume.
     solver : {"ipopt", "newton"}
         Minimiser, or the bordered corrector (which also follows saddle points).
     at_limit : {"stop", "jump"}
-        Where the branch turns back before a load, or becomes unstable at a branch point (``solver="ipopt"``): end there, saying where the
-        membrane would go, or go to the next stable state at that load, of this branch or of the one that crosses it, and on from there.
+        What to do where the branch turns back before a load, or becomes unstable at a branch point (``solver="ipopt"``). "stop" ends there
+        and says where the membrane would go. "jump" goes on from the next stable state at this load, on this branch or on the crossing one.
     throw : bool
         Raise when a volume cannot be reached; otherwise return what was reached, with its status and message.
     on_step : callable, optional
@@ -59,7 +60,17 @@ def inflate(
     Raises
     ------
     InputError, SolveError
-        The latter carries the branch up to the failure as ``result``.
+        A SolveError carries the branch up to the failure as ``result``.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16))
+    >>> for eq in fm.inflate(scene, volumes=[0.5, 1.0, 2.0]):
+    ...     print(f"V = {eq.volume:.1f}  P = {eq.pressure:.4f}")
+    V = 0.5  P = 0.2905
+    V = 1.0  P = 1.0669
+    V = 2.0  P = 1.8025
     """
     request = LoadRequest(CONTROLS["volume"], checked_loads("volumes", volumes), start, solver, at_limit, throw)
     return _follow(scene, request, on_step=on_step)
@@ -78,7 +89,7 @@ def pressurize(
 ) -> Branch:
     """Follow the membrane through given pressures P = p R0/(mu T), in the order given; otherwise as :func:`inflate`.
 
-    Without ``start`` the first state is the first stable equilibrium met on the branch through the moderately inflated membrane.
+    Without ``start`` the first state is the first stable equilibrium on the branch through the moderately inflated membrane.
 
     Parameters
     ----------
@@ -95,7 +106,17 @@ def pressurize(
     Raises
     ------
     InputError, SolveError
-        The latter carries the branch up to the failure as ``result``.
+        A SolveError carries the branch up to the failure as ``result``.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16))
+    >>> for eq in fm.pressurize(scene, pressures=[0.5, 1.0, 1.5]):
+    ...     print(f"P = {eq.pressure:.1f}  V = {eq.volume:.4f}")
+    P = 0.5  V = 0.6398
+    P = 1.0  V = 0.9537
+    P = 1.5  V = 1.3881
     """
     request = LoadRequest(CONTROLS["pressure"], checked_loads("pressures", pressures), start, solver, at_limit, throw)
     return _follow(scene, request, on_step=on_step)
@@ -115,8 +136,8 @@ def equilibrium(
     """One equilibrium at a volume, a pressure, a height of the pole, or with a fixed amount of gas.
 
     Exactly one of ``volume``, ``pressure``, ``center_height`` and ``gas`` is given. Under volume and pressure control the state is a
-    minimum (``solver="ipopt"``), or any solution of the equations (``"newton"``). The other two always take the Newton corrector:
-    a height is held by no potential, and with a gas the branch is followed as the gas is let in.
+    minimum (``solver="ipopt"``), or any solution of the equations (``"newton"``). Heights and gases always take the Newton corrector: no
+    potential holds a height, and the branch is followed while the gas is let in.
 
     Parameters
     ----------
@@ -128,9 +149,9 @@ def equilibrium(
     center_height : float, optional
         Height over R0 of the pole, or of the first point of a meridian without a pole.
     gas : Gas, optional
-        Amount of gas behind the membrane.
+        A fixed amount of gas behind the membrane.
     start : Equilibrium, optional
-        A neighbour to start from; default: a cold start from the moderately inflated membrane.
+        A neighbour to start from. Default: a cold start from the moderately inflated membrane.
     solver : {"ipopt", "newton"}
         Minimiser, or the bordered corrector (which also finds saddle points).
 
@@ -141,6 +162,16 @@ def equilibrium(
     Raises
     ------
     InputError, SolveError
+        SolveError when no equilibrium was found; its message says what was tried.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> eq = fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volume=1.0)
+    >>> print(f"P = {eq.pressure:.4f}, pole at {eq.center_height:.4f}")
+    P = 1.0669, pole at 0.5528
+    >>> eq.verdict("pressure").word
+    'stable'
     """
     given = {"volume": volume, "pressure": pressure, "center_height": center_height, "gas": gas}
     control, load = only("equilibrium", given, "exactly one of volume, pressure, center_height and gas is allowed")
@@ -158,7 +189,7 @@ def equilibrium(
 def run(
     scene: Scene, on_step: OnStep | None = None, *, on_checkpoint: OnCheckpoint | None = None, unfinished: Branch | None = None
 ) -> Branch:
-    """Do what the scene's [run] says; never raises for a solve that fails: the branch carries its status and message.
+    """Do what the scene's [run] says. A solve that fails raises nothing: the branch carries its status and message.
 
     Parameters
     ----------
@@ -168,8 +199,8 @@ def run(
     on_checkpoint : callable, optional
         Called after each equilibrium with the branch so far, which may be saved.
     unfinished : Branch, optional
-        The last branch that ``on_checkpoint`` was called with, when a run of this scene was interrupted: it is finished, and the result is
-        that of an uninterrupted run to the last bit.
+        The last branch that ``on_checkpoint`` was called with, when a run of this scene was interrupted. It is finished, and the result is
+        the same to the last bit as without the interrupt.
 
     Returns
     -------

@@ -14,7 +14,10 @@ from ..accuracy.adapt import spread
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, potential_of
-from ..results.records import Branch, Equilibrium, Jump, PathMemory, SpecialPoint
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.path_memory import PathMemory
+from ..results.special_point import Jump, SpecialPoint
 from ..scene import MAX_STEPS, Scene
 from ..scene.run import AT_LIMIT
 from ..solve.controls import CONTROLS, ControlKind, Controlled, Gas

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import SolveError, Status
 from ..potential import potential_of
-from ..results.records import Equilibrium
+from ..results.equilibrium import Equilibrium
 from ..scene import Scene
 from ..solve.finer_space import transferred
 from .arguments import check_scene

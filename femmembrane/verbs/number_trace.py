@@ -9,7 +9,10 @@ from typing import Any, Self
 from ..checks import choice, number, sign
 from ..errors import InputError, Status
 from ..potential import potential_of
-from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.path_memory import TraceMemory
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..solve import state_resolution
 from ..solve.continuation import BranchPoint, StepControl

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scene import Scene
-from .quantities import UNEXPECTED, Options, Row, compute
+from .sweep_rows import UNEXPECTED, Options, Row, compute
 
 #: key, scene, quantity, options
 Task = tuple[str, Scene, str, Options]

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Generic, Self, TypeAlias, TypeVar
 
 from ..errors import Status
 from ..potential import Potential
-from ..results.records import Branch, Equilibrium, SoFar
+from ..results.branch import Branch, SoFar
+from ..results.equilibrium import Equilibrium
 from ..scene import Scene
 from ..solve.state import State
 from .state_records import OnCheckpoint, OnStep

@@ -12,7 +12,10 @@ from ..checks import store
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
 from ..results.analyses import asked
-from ..results.records import Branch, Equilibrium, PathMemory, SpecialPoint
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.path_memory import PathMemory
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..solve.continuation import BranchPoint
 from ..solve.controls import Gas, PressureControl, VolumeControl

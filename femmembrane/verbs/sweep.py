@@ -21,13 +21,13 @@ from ..discretization.meridian import side
 from ..errors import InputError
 from ..memory import require
 from ..results.finished_scenes import FinishedScenes
-from ..results.grid import MEANING, dataset_of
+from ..results.grid import DIMENSIONS, dataset_of
 from ..results.store import scene_text
 from ..results.sweep import Plan, Sweep
 from ..scene import Scene
 from ..scene.keys import MAX_SCENES, set_key
 from . import parallel
-from .quantities import QUANTITIES, UNEXPECTED, Options, Row, check, compute
+from .sweep_rows import COMPUTED, UNEXPECTED, Options, Row, check, compute
 
 if TYPE_CHECKING:
     pass
@@ -194,7 +194,7 @@ class _Grid:
             raise InputError("scene", scene, "a Scene is allowed")
         values = _checked(over)
         tables = scene.to_dict()
-        if quantity not in QUANTITIES or not values:  # the rest is asked of each scene below
+        if quantity not in COMPUTED or not values:  # the rest is asked of each scene below
             check(scene, quantity, options)
         keys = []
         for changed in _scenes(tables, values):
@@ -302,7 +302,7 @@ def _known(grid: _Grid, kept: FinishedScenes | None) -> dict[str, Row]:
 
 
 def _row(kept: Mapping[str, Any] | None) -> Row | None:
-    if kept is None or kept.keys() != {f.name for f in fields(Row)} or not kept["values"].keys() <= MEANING.keys():
+    if kept is None or kept.keys() != {f.name for f in fields(Row)} or not kept["values"].keys() <= DIMENSIONS.keys():
         return None
     return _compact(Row(**kept))
 

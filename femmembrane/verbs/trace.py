@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..errors import SolveError, Status
-from ..results.records import Branch, Equilibrium, SpecialPoint
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..solve.continuation import StepControl
 from ..threads import one_thread
@@ -41,37 +43,39 @@ def trace(
     ----------
     scene : Scene
     start : float, Equilibrium, SpecialPoint or Branch, optional
-        A volume (default that of the moderately inflated membrane: that at rest and 0.5, or an eighth of it), an equilibrium of this scene,
-        or a traced branch to be continued (its points are part of the result, and the new ones are those of an uninterrupted trace to
-        the last bit; it keeps its own direction, step and search for special points). From a branch point (of the ``special_points`` of
-        a branch of this scene) the *other* branch that crosses there is traced, one half of it: ``fm.trace(scene, start=point)``. From
-        another special point that is an equilibrium of this branch the trace sets out as from that equilibrium.
+        Where to set out from:
+
+        * a volume; the default is the moderately inflated membrane, whose volume exceeds the volume at rest by an eighth of it, or by 0.5;
+        * an equilibrium of this scene, or a special point of a branch, which counts as the equilibrium there;
+        * a branch point of a branch of this scene: one half of the *crossing* branch is traced, ``fm.trace(scene, start=point)``;
+        * a traced branch, which is continued. Its points are part of the result. It keeps its own direction, step and search for special
+          points, and the new points are the same to the last bit as without the interruption.
     until : mapping, optional
-        Where to end: values of any of volume, pressure, center_height, and over a number of the number by its name, whichever is met
-        first; the last point lies exactly on it. The start itself does not count, and what lies behind it is met, if at all, on a distant
-        part of the branch: see ``direction``.
+        Where to end: values of any of volume, pressure and center_height. The first value that is met ends the trace, and the last point
+        lies exactly on it. The start itself does not count. A value behind the start is met on a distant part of the branch, if at all: see
+        ``direction``. Over a number it may be a value of that, by its name.
     over : str, optional
         A number of the scene that changes along the branch in place of the load, such as ``source.0.height``: see
         :mod:`femmembrane.scene.variation`. It sets out from its value in ``scene``, and every equilibrium has its own scene.
     hold : mapping, optional
-        What is held meanwhile: a value of one of volume, pressure, center_height. The membrane is first brought there from ``start``;
+        What is held meanwhile: a value of one of volume, pressure and center_height. The membrane is first brought there from ``start``;
         without a start, as :func:`equilibrium` finds it.
     direction : {1, -1}, optional
-        1 (default) sets out towards larger volume; over a number to larger numbers, and by default towards the value of it in ``until``.
-        From a branch point it names the half of the other branch: 1 that on which the volume grows,
-        or where it is stationary, as on both halves of a pitchfork, that on which the pole rises (with the pole held, the membrane).
+        1 (default) sets out towards larger volume. Over a number it sets out towards larger numbers; the default is then the way to the
+        number in ``until``. From a branch point it names a half of the crossing branch: on half 1 the volume grows. Where the
+        volume is stationary, as on both halves of a pitchfork, the pole rises on half 1 (or the membrane, if the pole is held).
     max_steps : int
-        Most steps.
+        Most steps along the branch.
     steps : StepControl, optional
         Lengths and accuracy of the steps.
     special_points : bool
         Whether limit points, volume folds, height folds and branch points are located.
     ill_posed : {"stop", "mark"}
-        What to do where the meridional stress is compressive, so that the Legendre-Hadamard condition fails and the plain membrane
-        has no mesh-independent equilibria, or where a tension field is slack: end there, or go on with that status on every such state.
+        What to do where the states depend on the mesh: "stop" ends there, "mark" goes on and gives every such state its status. The states
+        of a plain membrane depend on the mesh where the meridional stress is compressive, since the Legendre-Hadamard condition fails
+        there. The states of a tension field do where it is slack.
     throw : bool
-        Raise when the branch ends before ``until`` is met. A branch that ends is a result, so by default it is returned, with the
-        reason in its status and message.
+        Raise when the branch ends before ``until`` is met. By default such a branch is returned, with the reason in its status and message.
     on_step : callable, optional
         Called with (index, total, equilibrium) after each step.
     on_checkpoint : callable, optional
@@ -84,9 +88,21 @@ def trace(
     Raises
     ------
     InputError, SolveError
-        The former also for an azimuthal onset as start: the states beyond it are not axisymmetric, and are not computed. The latter when
-        the start cannot be reached or no mesh meets the accuracy that the scene asks for, and for ``throw``: then it
-        carries the branch as ``result``.
+        InputError also for an azimuthal onset as start: the states beyond it are not axisymmetric, and are not computed. SolveError when
+        the start cannot be reached, when no mesh meets the accuracy that the scene asks for, and for ``throw``; then it carries the branch
+        as ``result``.
+
+    Examples
+    --------
+    The pressure of a neo-Hookean disc has a maximum, which the branch passes:
+
+    >>> import femmembrane as fm
+    >>> branch = fm.trace(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), until={"volume": 10.0})
+    >>> for point in branch.special_points:
+    ...     print(f"{point.kind}: P = {point.pressure:.4f}, V = {point.volume:.3f}")
+    limit_point: P = 1.8792, V = 2.797
+    >>> branch[-1].verdict("pressure").word, branch[-1].verdict("volume").word
+    ('unstable', 'stable')
     """
     check_scene(scene)
     common: dict[str, Any] = {"max_steps": max_steps, "steps": steps, "ill_posed": ill_posed, "special_points": special_points}
@@ -109,7 +125,7 @@ def trace_iter(
     steps: StepControl | None = None,
     ill_posed: str = "stop",
 ) -> Iterator[Equilibrium]:
-    """The equilibria of :func:`trace` one by one, as they are found: a loop may look at each and stop when it likes.
+    """The equilibria of :func:`trace` one by one, as they are found. A loop may look at each and stop when it likes.
 
     The iterator ends where the branch does, or after ``max_steps``. It locates no special points, and chooses no mesh for an accuracy.
 

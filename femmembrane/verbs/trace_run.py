@@ -10,8 +10,12 @@ from typing import Any, Self, TypeAlias
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
-from ..results.records import Branch, Equilibrium, SpecialPoint, TraceMemory
-from ..scene import QUANTITIES, Scene
+from ..quantities import PLACES
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.path_memory import TraceMemory
+from ..results.special_point import SpecialPoint
+from ..scene import Scene
 from ..solve import state_resolution, wellposed
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import stopped_by_source, touches_source
@@ -128,7 +132,7 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
         raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
     targets = dict(until or {})
     for quantity, value in targets.items():
-        choice("until", quantity, QUANTITIES)
+        choice("until", quantity, PLACES)
         targets[quantity] = number(f"until.{quantity}", value)
     return targets
 

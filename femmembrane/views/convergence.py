@@ -9,29 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import unknown_name
+from ..quantities import axis_label
 from ..results.convergence import RESOLVED, Convergence
-from .plots import new_figure, save_figure
+from .figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: names of the panels
-TITLES = {
-    "pressure": "pressure P",
-    "volume": "volume V",
-    "center_height": "pole height η(0)",
-    "elastic_energy": "elastic energy",
-    "magnetic_energy": "magnetic energy",
-    "energy": "total energy",
-    "lambda_pressure": "λ at constant pressure",
-    "lambda_volume": "λ at constant volume",
-    "profile_l2": "profile (ρ, η), L² norm",  # noqa: RUF001
-    "profile_h1": "profile (ρ, η), H¹ norm",  # noqa: RUF001
-    "limit_pressure": "first limit point, P",
-    "limit_volume": "first limit point, V",
-}
-AGAINST = {"unknowns": "unknowns", "element_size": "largest element h/R₀"}
+AGAINST = ("unknowns", "element_size")
 _MARKERS = "osD^vPX*"
 _DASHES: tuple[Any, ...] = (
     "-",
@@ -89,18 +75,17 @@ def plot_convergence(
 def _draw(axes: Axes, study: Convergence, name: str, against: str) -> list[Any]:
     errors, resolved, orders = study.errors[name], study.resolved(name), study.orders(name)
     if study.scale[name] == 1:
-        axes.set_title(f"{TITLES[name]} (absolute)", fontsize=10)
+        axes.set_title(f"{axis_label(name)} (absolute)", fontsize=10)
     else:
-        axes.set_title(TITLES[name], fontsize=10)
-    _scales(axes, AGAINST[against])
+        axes.set_title(axis_label(name), fontsize=10)
+    _scales(axes, axis_label(against))
     shades = np.linspace(0.0, 0.55, len(study.degrees))
     handles = []
     for i, degree in enumerate(study.degrees):
         x = study.unknowns[i].astype(float) if against == "unknowns" else study.element_size
         look: dict[str, Any] = {"color": str(shades[i]), "marker": _MARKERS[degree - 1], "markersize": 5.5, "linewidth": 1.3}
         shown = np.where(errors[i] > 0, errors[i], np.nan)
-        label = f"degree {degree}"
-        handles += axes.plot(x, np.where(resolved[i], shown, np.nan), linestyle=_DASHES[degree - 1], label=label, **look)
+        handles += axes.plot(x, np.where(resolved[i], shown, np.nan), linestyle=_DASHES[degree - 1], label=f"degree {degree}", **look)
         axes.plot(x, np.where(resolved[i], np.nan, shown), **(look | {"linestyle": "none", "markerfacecolor": "white"}))
         known = np.flatnonzero(np.isfinite(orders[i]))
         if known.size:
@@ -117,12 +102,12 @@ def _draw(axes: Axes, study: Convergence, name: str, against: str) -> list[Any]:
     return handles
 
 
-def _scales(axes: Axes, label: str) -> None:
+def _scales(axes: Axes, across: str) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel(label)
+    axes.set_xlabel(across)
     axes.grid(color="0.9", linewidth=0.6)
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..solve.controls import CONTROLS
+from ..quantities import axis_label, heading
 from .backend import title_text
-from .plots import new_figure, save_figure
+from .figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +59,7 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
     for axes, start in zip(panels, starts, strict=True):
         _draw(axes, [line for line in solves if line.start == start], floor)
         axes.set_title(_HEADINGS[start], fontsize=10)
-        axes.set_xlabel("wall time of one equilibrium in ms")
+        axes.set_xlabel(axis_label("milliseconds"))
         axes.set_ylabel(f"relative error of the {study.quantity}" if axes is panels[0] else "")
         axes.sharey(panels[0])
     bottom = 0.25 * floor
@@ -69,9 +69,8 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
     entries = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     look: dict[str, Any] = {"ncols": 4 if len(starts) > 1 else 2, "frameon": False, "fontsize": 8.5, "handlelength": 3.4}
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", **look)
-    symbol = CONTROLS[study.control].symbol
     title = f"{title_text(study.scene.title)}, " if study.scene.title else ""
-    figure.suptitle(f"{title}{symbol} = {study.load:.6g}", fontsize=11, wrap=True, parse_math=False)
+    figure.suptitle(f"{title}{heading(study.control)} = {study.load:.6g}", fontsize=11, wrap=True, parse_math=False)
     return save_figure(figure, path)
 
 

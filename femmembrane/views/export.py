@@ -28,11 +28,13 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..files import remove_leftovers, replace_file, write_csv
+from ..quantities import in_si, si_values
 from .surroundings import place_of
 from .vtk import FIELDS, Array, Revolution, shown_length, smooth_profile, surface_data, write_surface, write_vtk
 
 if TYPE_CHECKING:
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: codes of XDMF's mixed topology
 _TRIANGLE, _QUAD = 4, 5
@@ -90,14 +92,14 @@ def _write_csv(shown: Sequence[tuple[int, Equilibrium]], path: Path) -> list[Pat
     """One line a node: step, loads, and the profile."""
     names = [name for name in ("r", "rho", "eta", *FIELDS) if name in shown[0][1].profile()]
     scales = shown[0][1].scene.scales
-    in_m = [] if scales is None else [name for name in ("r", "rho", "eta") if name in names]
-    columns = [*names, *(f"{name}_m" for name in in_m)]
+    in_m = [] if scales is None else ["r", "rho", "eta"]
+    columns = [*names, *map(in_si, in_m)]
 
     def rows() -> Iterator[list[Any]]:
         for number, equilibrium in shown:
             profile = dict(equilibrium.profile())
             if scales is not None:
-                profile |= {f"{name}_m": scales.to_si("length", profile[name]) for name in in_m}
+                profile |= si_values({name: profile[name] for name in in_m}, scales)
             for node in zip(*(profile[name].tolist() for name in columns), strict=True):
                 yield [number, equilibrium.volume, equilibrium.pressure, *node]
 
@@ -120,6 +122,7 @@ def _write_stl(equilibrium: Equilibrium, path: Path) -> None:
 
 
 def _write_obj(equilibrium: Equilibrium, path: Path) -> None:
+    # meshio writes the time of day into the file, so that the same run would not give the same bytes
     points, revolution = _surface(equilibrium)
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
     lines += [
@@ -140,7 +143,10 @@ def _write_pvd(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
 
 
 def _write_xdmf(branch: Sequence[Equilibrium], path: Path) -> list[Path]:
-    """A collection in time, one grid an equilibrium: common cells, own points and point data."""
+    """A collection in time, one grid an equilibrium: common cells, own points and point data.
+
+    The writer of meshio has the points of one mesh for all times, and puts its HDF5 file into the working directory.
+    """
     import h5py
 
     numbers, grids = path.with_suffix(".h5"), []

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..files import replace_file
+from ..quantities import axis_label, key_label
 from ..results.folds import FOLD_NAMES, FoldCurve
-from .backend import drawing, load, title_text
+from .backend import load, title_text
+from .figures import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_LABELS = (
-    (r"source\.(\d+)\.strength", "dipole strength M = μ₀D²/(R₀⁶μ)"),
-    (r"source\.(\d+)\.height", "height of the source h/R₀"),
-    (r"membrane\.susceptibility", "susceptibility χ"),
-    (r"material\.mu\.(\d+)", "modulus of term {0} over the shear modulus, μ{0}/μ"),
-    (r"material\.alpha\.(\d+)", "exponent of term {0}, α{0}"),  # noqa: RUF001
-)
 _MARKERS = {"cusp": ("D", "cusp: two of them merge"), "branch_point": ("s", "branch point: limit point meets volume fold")}
-_AXES = {"pressure": "pressure at the fold P = pR₀/(μT)", "volume": "volume at the fold V/R₀³"}
 
 
 def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -> Figure:
@@ -45,32 +37,21 @@ def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -
     title = curve.equilibria[0].scene.title if curve.equilibria else ""
     heading = title_text(title) or FOLD_NAMES[curve.kind][0].upper() + FOLD_NAMES[curve.kind][1:]
     figure.suptitle(heading, fontsize=11, wrap=True, parse_math=False)
-    for axes, (name, label) in zip(panels, _AXES.items(), strict=True):
+    for axes, name in zip(panels, ("pressure", "volume"), strict=True):
         _draw(axes, curve, name)
-        axes.set_ylabel(label)
-    panels[-1].set_xlabel(_label(curve.parameter))
+        axes.set_ylabel(f"at the fold: {axis_label(name)}")
+    panels[-1].set_xlabel(key_label(curve.parameter))
     panels[0].legend(fontsize=9, framealpha=0.9, edgecolor="none")
-    if path is not None:
-        with replace_file(path) as temporary, drawing():
-            figure.savefig(temporary, dpi=160)
-    return figure
+    return save_figure(figure, path)
 
 
 def _draw(axes: Axes, curve: FoldCurve, name: str) -> None:
     axes.plot(curve.values, getattr(curve, name), "-", color="#0072b2", linewidth=1.8, zorder=2, label=FOLD_NAMES[curve.kind])
     axes.plot(curve.values, getattr(curve, name), ".", color="#0072b2", markersize=4, zorder=2)
-    for kind, (marker, label) in _MARKERS.items():
+    for kind, (marker, text) in _MARKERS.items():
         places = np.array([[c.value, getattr(c, name)] for c in curve.cusps if c.kind == kind]).reshape(-1, 2)
         if len(places):
             look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "zorder": 3}
-            axes.plot(*places.T, marker, label=label, **look)
+            axes.plot(*places.T, marker, label=text, **look)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", linewidth=0.6)
-
-
-def _label(parameter: str) -> str:
-    for pattern, label in _LABELS:
-        match = re.fullmatch(pattern, parameter)
-        if match:
-            return label.format(*(str(int(k) + 1) if "term" in label else k for k in match.groups()))
-    return parameter

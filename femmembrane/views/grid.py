@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..results.grid import MEANING
-from ..results.quantities import PLACES, QUANTITIES
+from ..quantities import axis_label, key_label
+from ..results.grid import DIMENSIONS, place_of_variable
 from .backend import title_text
-from .plots import new_figure, save_figure
+from .figures import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,19 +34,6 @@ SHOWN = {
     "equilibria": ("equilibria", "stable_equilibria"),
     "tipping": ("onset_center_height", "onset_pressure"),
     "wrinkling": ("onset_center_height", "onset_pressure"),
-}
-_KEYS = {
-    "strength": "dipole strength M = μ₀D²/(R₀⁶μ)",
-    "height": "dipole height h/R₀",
-    "membrane.susceptibility": "susceptibility χ",
-    "run.start": "first load",
-    "run.stop": "last load",
-}
-_LABELS = {
-    "limit_points": "number of limit points",
-    "equilibria": "number of equilibria",
-    "stable_equilibria": "number of stable equilibria",
-    "largest_wrinkled_fraction": "largest wrinkled part of the area",
 }
 _HATCHES = ("////", "\\\\\\\\", "xxxx", "....", "----", "||||", "++++", "oooo")
 _MARKERS = "osv^D<>p"
@@ -96,7 +83,7 @@ def _available(data: Any, names: Sequence[str]) -> Iterator[str]:
 
 def _values(data: Any, name: str, dims: tuple[str, ...]) -> Array:
     """The numbers of a panel, shape of the grid."""
-    known = [str(v) for v in data.data_vars if data[v].dtype.kind == "f" and v in MEANING]
+    known = [str(v) for v in data.data_vars if data[v].dtype.kind == "f" and v in DIMENSIONS]
     variable, _, place = str(name).partition(".")
     if variable not in known:
         raise unknown_name("show", name, known)
@@ -115,17 +102,8 @@ def _values(data: Any, name: str, dims: tuple[str, ...]) -> Array:
 def _label(name: str) -> str:
     """What a panel shows, with its unit."""
     variable, _, place = name.partition(".")
-    if variable in _LABELS:
-        return _LABELS[variable]
-    tag, _, quantity = ("", "", variable) if variable in PLACES else variable.partition("_")
-    if quantity not in PLACES:
-        return MEANING[variable][1]
-    what = {"": "step", "limit": "limit point", "fold": "volume fold", "onset": "onset", "state": "equilibrium"}[tag]
-    return f"{what}{f' {int(place) + 1}' if place else ''}: {QUANTITIES[quantity].label}"
-
-
-def _key_label(key: str) -> str:
-    return _KEYS.get(key) or (_KEYS.get(key.rpartition(".")[2]) if key.startswith("source.") else None) or key
+    quantity, what = place_of_variable(variable)
+    return f"{what}{f' {int(place) + 1}' if place else ''}: {axis_label(quantity)}" if quantity else axis_label(variable)
 
 
 def _reasons(data: Any, values: Array) -> Array:
@@ -167,7 +145,7 @@ def _draw_map(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values: A
     axes.set_facecolor("white")
     if np.isfinite(grid).any():
         _shade(axes, name, x_edges, y_edges, grid, grid[np.isfinite(grid) & (reasons == "")])
-    axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]), xlabel=_key_label(dims[0]), ylabel=_key_label(dims[1]))
+    axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]), xlabel=key_label(dims[0]), ylabel=key_label(dims[1]))
     for key, positions, axis in ((dims[0], x, axes.xaxis), (dims[1], y, axes.yaxis)):
         if not _positions(data, key)[1]:
             axis.set_ticks(positions, [title_text(str(v)) for v in data[key].values], parse_math=False)
@@ -224,7 +202,7 @@ def _draw_curve(axes: Axes, data: Any, dims: tuple[str, ...], name: str, values:
     order = np.argsort(x)
     x, values, reasons = x[order], values[order], _reasons(data, values)[order]
     axes.plot(x, values, "-", color="#0072b2", linewidth=1.6, marker=".", markersize=5)
-    axes.set(xlabel=_key_label(key), ylabel=_label(name))
+    axes.set(xlabel=key_label(key), ylabel=_label(name))
     axes.grid(color="0.92", linewidth=0.6)
     if not numbers:
         axes.set_xticks(x, [title_text(str(v)) for v in data[key].values[order]], parse_math=False)

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..quantities import PLACES, title
 from ..results.analyses import column_heading, remarks
 
 if TYPE_CHECKING:
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: most rows of a table of equilibria
 MOST_ROWS = 60
@@ -58,15 +60,10 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
 
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
     """The numbers of an equilibrium, with the verdicts that its scene asks for."""
-    energies = [("elastic energy", equilibrium.elastic_energy)]
-    energies += [("magnetic energy", equilibrium.magnetic_energy)] if equilibrium.scene.sources else []
+    scene = equilibrium.scene
+    energies = ["elastic_energy", *(["magnetic_energy"] if scene.sources else []), *(["load_energy"] if scene.loads else [])]
     return [
-        ("volume V", equilibrium.volume),
-        ("pressure P", equilibrium.pressure),
-        ("pole height", equilibrium.center_height),
-        *energies,
-        ("residual", equilibrium.residual),
-        ("status", equilibrium.status),
+        *((title(name), getattr(equilibrium, name)) for name in (*PLACES, *energies, "residual", "status")),
         *((remark.subject, remark.text) for remark in remarks(equilibrium)),
     ]
 

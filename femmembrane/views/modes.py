@@ -28,7 +28,7 @@ from .vtk import SECTORS, Array, Revolution, shown_length, smooth_profile, write
 if TYPE_CHECKING:
     import pyvista
 
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
     from ..results.vibration import Vibration
 
 #: largest displacement that is shown unless an amplitude is given, relative to half the size of the membrane

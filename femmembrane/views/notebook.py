@@ -14,7 +14,8 @@ from .html import branch_rows, equilibrium_pairs, table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 _ROWS = 12
 _SIDE_BY_SIDE = "display:flex;flex-wrap:wrap;gap:24px;align-items:center"

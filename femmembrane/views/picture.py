@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..files import replace_file
-from ..results.quantities import QUANTITIES
+from ..quantities import quantity
 from ..results.zones import KINDS
 from .backend import load
 from .surroundings import Box, surroundings
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     import pyvista
 
     from ..physics.outline import Outline
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -217,7 +218,7 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
         title = f"wrinkles by {criterion} stress"
     else:
         table = pyvista.LookupTable(_MAP, scalar_range=limits)
-        shown = QUANTITIES[surface.quantity]
+        shown = quantity(surface.quantity)
         title = shown.meaning if shown.unit == "1" else f"{shown.meaning} in {shown.unit}"
     mapper = pyvista.DataSetMapper()
     mapper.lookup_table, mapper.scalar_range = table, table.scalar_range

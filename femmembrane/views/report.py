@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import Status
 from ..files import replace_file
+from ..quantities import PLACES, axis_label, caption, heading, words
 from ..results.analyses import asked
 from ..results.analyses.base import Curves, Drawing, Section
 from . import plots
@@ -31,7 +32,8 @@ from .zones import new_label
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: inches: text is of a readable size in a column of a screen and on a phone
 _WIDTH, _HEIGHT = 4.7, 3.9
@@ -129,9 +131,9 @@ class _Page:
         state = f'<p class="badge {"good" if good else "bad"}">{escape(str(branch.status))}</p>'
         tiles = [("equilibria", str(len(branch)))]
         if len(branch):
-            for name, column in (("volume V/R₀³", "volume"), ("pressure P", "pressure"), ("pole height η(0)/R₀", "center_height")):
-                values = branch.column(column)
-                tiles.append((name, f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
+            for name in PLACES:
+                values = branch.column(name)
+                tiles.append((axis_label(name), f"{text(float(f'{values.min():.4g}'))} … {text(float(f'{values.max():.4g}'))}"))
             tiles.append(("largest residual", f"{branch.column('residual').max():.1e}".replace("-", "−")))  # noqa: RUF001
         shown = "".join(f'<div class="tile"><b>{value}</b><span>{escape(name)}</span></div>' for name, value in tiles)
         return f'{state}{message}<div class="tiles">{shown}</div>'
@@ -144,16 +146,15 @@ class _Page:
         return f"<figure>\n{svg}{about}</figure>"
 
     def _branch(self) -> str:
-        figures, over = [], self.branch.over
-        drawn = [("volume", "pressure", "Pressure against volume"), ("center_height", "pressure", "Pressure against pole height")]
-        if over:
-            up = plots.answer(self.branch)
-            drawn = [(over, up, f"{up.replace('_', ' ').capitalize()} against {over}"), drawn[0]]
-        for across, up, label in drawn:
+        up = plots.answer(self.branch)
+        figures, drawn = [], [(name, "pressure") for name in ("volume", "center_height")]
+        if self.branch.over:
+            drawn = [(self.branch.over, up), ("volume", "pressure" if up != "pressure" else "center_height")]
+        for across, up in drawn:
             figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
             plots.draw_branch(axes, self.branch, across=across, up=up)
             _legend_below(figure, axes)
-            figures.append(self._figure(figure, label))
+            figures.append(self._figure(figure, f"{words(up).capitalize()} against {words(across)}"))
         return _beside(*figures) + self._special_points() + self._jumps()
 
     def _special_points(self) -> str:
@@ -162,20 +163,17 @@ class _Page:
             return ""
         if not points:
             return "<p>Searched for special points: there are none.</p>"
-        names = {kind: name for kind, (_, name) in plots.MARKERS.items()}
-        over = self.branch.over
+        names, over = {kind: name for kind, (_, name) in plots.MARKERS.items()}, [self.branch.over] if self.branch.over else []
         rows = [
             [
                 names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
-                *([p.equilibrium.number(over)] if over else []),
-                p.volume,
-                p.pressure,
-                p.center_height,
+                *(p.equilibrium.number(name) for name in over),
+                *(getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
-        return table(["special point", *([over] if over else []), "V", "P", "pole height", "relative error"], rows)
+        return table(["special point", *over, *map(heading, PLACES), "relative error"], rows)
 
     def _jumps(self) -> str:
         rows = []
@@ -269,8 +267,8 @@ def _profiles(branch: Branch) -> Figure:
     box = Box.of([equilibrium.profile() for equilibrium in shown])
     figure, axes = plots.new_figure((_WIDTH, 1.9 + _HEIGHT * min(0.85, (box.high - box.low) / (2 * box.radius))))  # round stays round
     for equilibrium, color in zip(shown, colormaps["viridis"](np.linspace(0.85, 0.0, max(len(shown), 2))), strict=False):
-        label = f"V = {equilibrium.volume:.4g},  P = {equilibrium.pressure:.4g}"
-        plots.draw_profile(axes, equilibrium, plots.Style(label, "-", color))
+        named = caption(equilibrium.volume, equilibrium.pressure, ",  ")
+        plots.draw_profile(axes, equilibrium, plots.Style(named, "-", color))
     plots.draw_surroundings(axes, shown)
     _legend_below(figure, axes)
     return figure
@@ -289,7 +287,7 @@ def _along(equilibrium: Equilibrium, names: tuple[str, ...]) -> Figure:
         way = {"1": "along the meridian", "2": "around the axis"}[name[-1]]
         kind = name[:-2].replace("_", " ")
         axes.plot(profile.get("s", profile["r"]), profile[name], linestyle=dashes, color=color, linewidth=1.8, label=f"{kind} {way}")
-    axes.set_xlabel("arc length of the reference meridian s/R₀" if "s" in profile else "reference radius R/R₀")
+    axes.set_xlabel(axis_label("s" if "s" in profile else "r"))
     axes.grid(color="0.9", linewidth=0.6)
     if profile[names[0]].min() < 0 or min(profile[name].min() for name in names) < 0:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
@@ -328,12 +326,12 @@ def _scale_around_zero(axes: Any, known: Array) -> None:
         axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
 
 
-def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, label: str) -> None:
+def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, named: str) -> None:
     """A quantity against the step, with a gap where the membrane snaps."""
     breaks = [0, *(jump.index for jump in branch.jumps), len(branch)]
     look: dict[str, Any] = {"linestyle": _DASHES[kind % 4], "color": _COLORS[kind % 4], "linewidth": 1.8}
     for first, last in pairwise(breaks):
         steps = np.arange(first, last)
-        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, label), **look)
-    axes.set_xlabel("step")
+        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, named), **look)
+    axes.set_xlabel(axis_label("step"))
     axes.xaxis.get_major_locator().set_params(integer=True)

@@ -17,7 +17,7 @@ from ..checks import whole
 from ..physics.outline import Outline
 
 if TYPE_CHECKING:
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
     from ..scene import Scene
 
 Array = NDArray[np.float64]

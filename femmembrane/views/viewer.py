@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import replace_file
+from ..quantities import caption, words
 from ..results.analyses import remarks
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
@@ -22,7 +23,8 @@ from .surroundings import Box, place_of
 if TYPE_CHECKING:
     import pyvista
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
 
 #: sizes of a window and a picture, and of a movie; its frames take a quarter of a second each without a graphics card
 SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
@@ -159,7 +161,8 @@ def write_caption(plotter: pyvista.Plotter, text: str) -> None:
 
 
 def _caption(equilibrium: Equilibrium, number: int, total: int) -> str:
-    numbers = f"V = {equilibrium.volume:.4g}   P = {equilibrium.pressure:.4g}   pole height {equilibrium.center_height:.4g}"
+    height = f"{words('center_height')} {equilibrium.center_height:.4g}"
+    numbers = f"{caption(equilibrium.volume, equilibrium.pressure, '   ')}   {height}"
     answers = [remark.caption for remark in remarks(equilibrium) if remark.caption]
     step = f"step {number}/{total - 1}   " if total > 1 else ""
     return "\n".join(line for line in (step + numbers, ", ".join(answers)) if line)

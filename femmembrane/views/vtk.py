@@ -25,27 +25,17 @@ from numpy.typing import NDArray
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError
 from ..files import refuse_no_folder, replace_file
+from ..quantities import PROFILE, in_si, quantity, si_values
 from ..results.analyses import asked
 
 if TYPE_CHECKING:
-    from ..results.records import Equilibrium
+    from ..results.equilibrium import Equilibrium
 
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
 
 #: profile quantities that a file shows as point data, in this order; quantities in Pa only when the scene has scales
-FIELDS = (
-    "stretch_1",
-    "stretch_2",
-    "mechanical_stress_1",
-    "mechanical_stress_2",
-    "total_stress_1",
-    "total_stress_2",
-    "mechanical_stress_1_pa",
-    "mechanical_stress_2_pa",
-    "total_stress_1_pa",
-    "total_stress_2_pa",
-)
+FIELDS = (*PROFILE, *(in_si(name) for name in PROFILE if quantity(name).si))
 SECTORS = 48
 
 
@@ -201,7 +191,7 @@ def write_surface(equilibrium: Equilibrium, profile: Mapping[str, Array], file: 
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads), ("line", revolution.line)) if len(c)]
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     if (scales := equilibrium.scene.scales) is not None:
-        loads |= {"pressure_pa": scales.to_si("pressure", loads["pressure"]), "volume_m3": scales.to_si("volume", loads["volume"])}
+        loads |= si_values(loads, scales)
     mesh = meshio.Mesh(
         shown_length(equilibrium) * revolution.vectors(profile["rho"], profile["eta"]),
         cells,

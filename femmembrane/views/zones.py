@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
 
-    from ..results.records import Branch, Equilibrium
+    from ..results.branch import Branch
+    from ..results.equilibrium import Equilibrium
     from ..results.zones import Zones
     from ..scene import Scene
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import subprocess
@@ -110,3 +111,48 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     assert process.stderr.read() == b""
     process.stderr.close()
     assert process.wait() == 0
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        RuntimeError("std::bad_alloc"),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+        ImportError("some.so: failed to map segment from shared object"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_no_memory_is_one_line(
+    error: Exception, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run_out(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("femmembrane.verbs.run", run_out)
+    assert main(["run", "neo-hookean", "--out", str(tmp_path / "out")]) == 4
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert said.err.startswith("femmembrane: there is too little memory (")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_limit_below_what_the_libraries_take_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before they are imported: an OpenBLAS without memory ends the process, and a solver without memory may never come back."""
+    monkeypatch.setattr("femmembrane.memory._limits", lambda: iter([("addresses", 2**28)]))
+    assert main(["run", "neo-hookean", "--out", str(tmp_path / "out")]) == 4
+    assert "0.42 GiB of addresses at least, and a limit of this process leaves 0.25 GiB" in capfd.readouterr().err
+    monkeypatch.setattr("femmembrane.memory._limits", lambda: iter([("addresses", 2**30), ("data", 2**29)]))
+    assert main(["run", "neo-hookean", "--set", "run.values=[1.0]", "--out", str(tmp_path / "out")]) == 0
+
+
+def test_other_errors_are_not_called_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("something else")
+
+    monkeypatch.setattr("femmembrane.verbs.run", fail)
+    with pytest.raises(RuntimeError, match="something else"):
+        main(["run", "neo-hookean", "--out", str(tmp_path / "out")])

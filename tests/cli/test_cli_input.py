@@ -15,7 +15,8 @@ import pytest
 import femmembrane
 from femmembrane import cli
 from femmembrane.errors import SolveError, Status
-from femmembrane.results.records import Branch, Equilibrium
+from femmembrane.results.branch import Branch
+from femmembrane.results.equilibrium import Equilibrium
 from femmembrane.scene import Scene
 
 ROOT = Path(__file__).parents[2]
@@ -240,7 +241,7 @@ def test_progress_by_arc_length_promises_no_end(stand_in, tmp_path, capsys, monk
     monkeypatch.setenv("COLUMNS", "100")
     assert cli.main(["run", str(traced), "--out", str(tmp_path)]) == cli.DONE
     said = capsys.readouterr().err
-    assert "step 3, center height 0.5 until 5.2" in said
+    assert "step 3, pole height 0.5 until 5.2" in said
     assert "3/60" not in said
 
 

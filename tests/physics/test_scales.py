@@ -14,8 +14,8 @@ from scipy.constants import mu_0
 import femmembrane as fm
 from femmembrane import cli
 from femmembrane.errors import InputError
-from femmembrane.physics.scales import UNITS
 from femmembrane.potential import potential_of
+from femmembrane.quantities import SI_UNITS
 from femmembrane.results import table
 from femmembrane.scene.variation import Parameter
 from femmembrane.views import picture
@@ -27,7 +27,7 @@ RUBBER = fm.Scales(**TABLE)
 #: with mu0 = 4e-7 pi (true to 1e-9): M = 1e-7 m^2/(4 pi R0^6 mu) = 1e-7 144/(4 pi 6.25e-3) for m = 12 A m^2
 MOMENT, STRENGTH = 12.0, 1.8334649444186344e-4
 MAGNET = fm.Scales(**TABLE, dipole_moment=MOMENT)
-LINEAR = sorted(UNITS.keys() - {"dipole_strength"})
+LINEAR = sorted(SI_UNITS.keys() - {"dipole_strength"})
 
 
 # --- conversions

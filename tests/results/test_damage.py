@@ -526,7 +526,7 @@ def test_analysis_is_no_saving(tmp_path, monkeypatch, old):
 
 def test_a_checkpoint_is_taken_without_a_copy(old):
     """It keeps to the equilibria there were, while the list goes on growing."""
-    from femmembrane.results.records import SoFar
+    from femmembrane.results.branch import SoFar
 
     first, second, third = old
     growing = [first, second]

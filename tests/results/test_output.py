@@ -19,7 +19,8 @@ from femmembrane.physics.loads import Weight
 from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
 from femmembrane.results import output, store, table
-from femmembrane.results.records import Branch, SpecialPoint
+from femmembrane.results.branch import Branch
+from femmembrane.results.special_point import SpecialPoint
 from femmembrane.results.verdict import Verdict
 from femmembrane.scene import Analysis, Scene
 from femmembrane.verbs import inflate

@@ -126,7 +126,7 @@ def test_limits_of_the_process_are_seen():
     before = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (2**40, before[1]))
     try:
-        (left,) = memory._limits()
+        ((_, left),) = memory._limits()
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
     assert 0 < 2**40 - left < 2**38  # what the process has already

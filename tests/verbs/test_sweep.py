@@ -22,8 +22,8 @@ from femmembrane.errors import InputError
 from femmembrane.results.finished_scenes import FinishedScenes
 from femmembrane.scene.keys import set_all, set_key, values_of
 from femmembrane.verbs import parallel
-from femmembrane.verbs.quantities import QUANTITIES, UNEXPECTED, Options, Row, compute
 from femmembrane.verbs.sweep import KEPT
+from femmembrane.verbs.sweep_rows import COMPUTED, UNEXPECTED, Options, Row, compute
 from tests.cases import disc_scene
 
 STRENGTH, HEIGHT = "source.0.strength", "source.0.height"
@@ -222,11 +222,11 @@ def test_an_unexpected_error_is_a_row_that_is_tried_again(tmp_path, monkeypatch)
             raise ZeroDivisionError("a fault of the code")
         return Row("converged", "", {"steps": 1})
 
-    monkeypatch.setitem(QUANTITIES, "branch", fails)
+    monkeypatch.setitem(COMPUTED, "branch", fails)
     found = fm.sweep(below(), {STRENGTH: [100, 300, 500]}, workers=1, out=tmp_path).to_xarray()
     assert found["status"].values.tolist() == ["converged", UNEXPECTED, "converged"]
     assert found["message"].values[1] == "ZeroDivisionError: a fault of the code"
-    monkeypatch.setitem(QUANTITIES, "branch", lambda scene, options: Row("converged", "", {"steps": 2}))
+    monkeypatch.setitem(COMPUTED, "branch", lambda scene, options: Row("converged", "", {"steps": 2}))
     again = fm.sweep(below(), {STRENGTH: [100, 300, 500]}, workers=1, out=tmp_path).to_xarray()
     assert again["steps"].values.tolist() == [1, 2, 1]
 
@@ -253,8 +253,8 @@ def test_an_interrupted_sweep_goes_on(serial, tmp_path, monkeypatch):
 
 def test_what_a_row_depends_on_is_in_its_key(tmp_path, monkeypatch):
     calls = []
-    monkeypatch.setitem(QUANTITIES, "branch", lambda scene, options: calls.append(1) or Row("converged", "", {"steps": 1}))
-    monkeypatch.setitem(QUANTITIES, "tipping", QUANTITIES["branch"])
+    monkeypatch.setitem(COMPUTED, "branch", lambda scene, options: calls.append(1) or Row("converged", "", {"steps": 1}))
+    monkeypatch.setitem(COMPUTED, "tipping", COMPUTED["branch"])
 
     def again(scene, **options):
         calls.clear()
@@ -435,7 +435,7 @@ def test_a_map_names_its_axes_and_hatches_what_is_no_value(tmp_path):
     figure = found.plot(tmp_path / "map.png", show=["limit_points", "pressure.0"])
     panel = figure.axes[0]
     assert panel.get_xlabel() == "dipole strength M = μ₀D²/(R₀⁶μ)"
-    assert panel.get_ylabel() == "dipole height h/R₀"
+    assert panel.get_ylabel() == "height of the source h/R₀"
     hatched = [c for c in panel.collections if c.get_hatch()]
     statuses = set(found.to_xarray()["status"].values.ravel()) - {"converged"}
     assert statuses

@@ -147,6 +147,26 @@ def test_command_and_option(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     assert main(["report", str(tmp_path)]) == 2
 
 
+@pytest.mark.parametrize("change", ["mesh.elements=4", "run.values=[1.0, 1.5]", "title='the same'"])
+def test_a_branch_of_another_run_is_refused(change: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The page of a folder tells of one run: its branch.nc and run.json may not be of two, and ``--resume`` does not call them done."""
+    scene, out, other = tmp_path / "scene.toml", tmp_path / "out", tmp_path / "other"
+    scene.write_text(
+        'title = "the same"\n[material]\nmodel = "neo-hookean"\n[mesh]\nelements = 8\n[run]\nvalues = [1.0]\n', encoding="utf-8"
+    )
+    assert main(["run", str(scene), "--out", str(out)]) == 0
+    assert main(["run", str(scene), "--set", change, "--out", str(other)]) == 0
+    shutil.copy(other / "branch.nc", out / "branch.nc")
+    for words in (["report", str(out)], ["run", str(scene), "--out", str(out), "--resume"]):
+        assert main(words) == 2
+        said = capfd.readouterr().err
+        key = change.partition("=")[0]
+        assert (f"{key} is" if key != "title" else "of two runs") in said
+    assert not (out / "report.html").exists()
+    assert main(["report", str(other)]) == 0
+    assert main(["report", str(out / "branch.nc")]) == 0
+
+
 def test_a_run_without_equilibria_has_a_page(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(

@@ -13,7 +13,9 @@ from femmembrane.discretization.meridian import disc
 from femmembrane.errors import InputError, Status
 from femmembrane.physics.magnetics import Dipole
 from femmembrane.physics.materials import NeoHookean
-from femmembrane.results.records import Branch, Equilibrium, Jump, SpecialPoint
+from femmembrane.results.branch import Branch
+from femmembrane.results.equilibrium import Equilibrium
+from femmembrane.results.special_point import Jump, SpecialPoint
 from femmembrane.results.verdict import Verdict
 from femmembrane.scene import Analysis, Scene
 from femmembrane.verbs import inflate

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, unknown_name
-from ..quantities import Quantity, heading, typed
+from ...quantities import Quantity, heading, quantity, typed
 from .base import EquilibriumAnalysis, PrintedColumn, Remark
 from .error_estimates import ErrorEstimates
 from .pascals import Pascals
@@ -21,7 +21,7 @@ from .wrinkled_zones import WrinkledZones
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Equilibrium
+    from ..equilibrium import Equilibrium
 
 _VERDICTS = Verdicts()
 #: those that a scene asks for by keys of their own, in the order of their columns
@@ -74,6 +74,11 @@ def own_quantity(name: str) -> Quantity | None:
     return next((found for analysis in registered() if (found := analysis.quantity(name)) is not None), None)
 
 
+def known_quantity(name: str) -> Quantity:
+    """What is known of a column or variable: what an analysis says of its own, else what the table of quantities says."""
+    return own_quantity(name) or quantity(name)
+
+
 def typed_column(name: str, values: Iterable[Any]) -> NDArray[Any]:
     """The cells of a column as an array of its type."""
     own = own_quantity(name)
@@ -83,4 +88,4 @@ def typed_column(name: str, values: Iterable[Any]) -> NDArray[Any]:
 def column_heading(name: str) -> str:
     """The heading of a column where a person reads the table."""
     own = own_quantity(name)
-    return own.symbol if own is not None and own.symbol else heading(name)
+    return heading(name) if own is None else own.symbol or own.words or heading(name)

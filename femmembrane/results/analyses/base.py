@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantities import Quantity
+from ...quantities import Quantity
 
 if TYPE_CHECKING:
     import xarray
 
     from ...potential import Evaluation
     from ...scene import Scene
-    from ..records import Branch, Equilibrium, SpecialPoint
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
+    from ..special_point import SpecialPoint
 
 Array = NDArray[np.float64]
 #: one cell of a table

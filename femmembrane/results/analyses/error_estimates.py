@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     import xarray
 
     from ...scene import Scene
-    from ..records import Branch, Equilibrium
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
 
 
 def held_by(scene: Scene) -> str:

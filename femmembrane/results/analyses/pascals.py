@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ...quantities import in_si, quantity
 from .base import Cell, EquilibriumAnalysis
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Equilibrium
+    from ..equilibrium import Equilibrium
 
 
 class Pascals(EquilibriumAnalysis):
@@ -19,8 +20,8 @@ class Pascals(EquilibriumAnalysis):
         return scene.scales is not None
 
     def columns(self, scene: Scene) -> Sequence[str]:
-        return ("pressure_pa",)
+        return (in_si("pressure"),)
 
     def value(self, equilibrium: Equilibrium, column: str) -> Cell:
         scales = equilibrium.scene.scales
-        return float("nan") if scales is None else float(scales.to_si("pressure", equilibrium.pressure))
+        return float("nan") if scales is None else float(scales.to_si(quantity("pressure").si, equilibrium.pressure))

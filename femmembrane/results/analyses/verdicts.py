@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...quantities import axis_label, heading, typed
 from ...scene import VERDICTS, Perturbations
 from .. import door
-from ..quantities import Quantity, typed
 from ..verdict import Verdict
 from .base import Array, Cell, Curves, EquilibriumAnalysis, PrintedColumn, Remark, Section, Table, Variable
 
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     from ...potential import Evaluation
     from ...scene import Scene
-    from ..records import Branch, Equilibrium
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
 
 #: controls whose verdicts are printed of a scene that asks for none
 _PRINTED = ("pressure", "volume")
@@ -29,15 +30,6 @@ _COLUMN = re.compile(rf"(lambda|verdict)_(?:({'|'.join(VERDICTS)})|n([1-9]\d*))"
 _STABLE = {"stable": True, "unstable": False, "marginal": None}
 #: in place of a number of negative directions that was not determined
 _UNCOUNTED = -1
-#: what the variables of a verdict mean; their names go on with the tag of the perturbations
-_MEANINGS = {
-    "lambda_error": Quantity("bound on the algebraic error of the smallest eigenvalue"),
-    "lambda": Quantity("smallest eigenvalue, omega^2 rho_m R0^2/mu"),
-    "verdict": Quantity("stability", type=str),
-    "negative_directions": Quantity(f"number of negative eigenvalues ({_UNCOUNTED}: not counted)", type=int),
-    "reason": Quantity("reason of the verdict", type=str),
-    "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
-}
 
 
 class Verdicts(EquilibriumAnalysis):
@@ -75,15 +67,6 @@ class Verdicts(EquilibriumAnalysis):
 
     def point_columns(self, scene: Scene) -> Sequence[str]:
         return ("azimuthal",) if scene.analysis.azimuthal_modes else ()
-
-    def quantity(self, name: str) -> Quantity | None:
-        kind = next((k for k in _MEANINGS if name.startswith(k + "_")), None)
-        if kind is None:
-            return None
-        tag, _, part = name.removeprefix(kind + "_").partition("_")
-        against = f"azimuthal mode n = {tag[1:]}" if tag[1:].isdigit() else f"axisymmetric shapes under {tag} control"
-        known = _MEANINGS[kind]
-        return Quantity(f"{known.meaning}, {against}" + (f": {part}" if part else ""), type=known.type)
 
     # --- files
 
@@ -123,9 +106,10 @@ class Verdicts(EquilibriumAnalysis):
                 span = str(steps[0]) if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
                 rows.append([p.words, word, span, *(_span(branch.column(c)[steps]) for c in ("volume", "pressure"))])
             last.append(Remark(p.words, verdicts[-1].reason))
-            curves[f"λ, {p.held}"] = branch.column(f"lambda_{p.tag}")
-        figure = Curves("Smallest eigenvalues along the branch", "smallest eigenvalue λ", curves)
-        return Section("Verdicts", figure, Table(["against", "verdict", "steps", "V", "P"], rows), last)
+            name = f"lambda_{p.tag}"
+            curves[axis_label(name)] = branch.column(name)
+        figure = Curves("Smallest eigenvalues along the branch", axis_label("lambda"), curves)
+        return Section("Verdicts", figure, Table(["against", "verdict", "steps", heading("volume"), heading("pressure")], rows), last)
 
 
 def stretches(words: Sequence[str]) -> Iterator[tuple[str, list[int]]]:

@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import files
+from ...quantities import heading, typed
 from .. import door
-from ..quantities import typed
 from ..zones import KINDS
 from .base import Cell, Drawing, EquilibriumAnalysis, PrintedColumn, Remark, Section, Table, Variable
 from .verdicts import stretches
 
 if TYPE_CHECKING:
     from ...scene import Scene
-    from ..records import Branch, Equilibrium
+    from ..branch import Branch
+    from ..equilibrium import Equilibrium
 
 #: the columns of ``zones.csv``; variables have these names after ``zone_``
 ZONE_COLUMNS = ("step", "kind", "r_start", "r_end", "rho_start", "rho_end", "area_fraction", "deformed_area_fraction")
@@ -76,4 +77,5 @@ class WrinkledZones(EquilibriumAnalysis):
         shown = [step for steps in runs for step in dict.fromkeys((steps[0], steps[-1]))][:_MOST_ROWS]
         rows = [[step, branch[step].volume, branch[step].zones().summary] for step in shown]
         caption = "First and last step with the same kinds of zones, and their parts of the reference area"
-        return Section("Zones", Drawing("Taut and wrinkled zones", door.draw_zones), Table(["step", "V", "zones"], rows, caption))
+        table = Table(["step", heading("volume"), "zones"], rows, caption)
+        return Section("Zones", Drawing("Taut and wrinkled zones", door.draw_zones), table)

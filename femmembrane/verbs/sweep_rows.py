@@ -12,7 +12,10 @@ from scipy.optimize import brentq
 
 from ..checks import choice, number
 from ..errors import FemmembraneError, InputError, SolveError, Status
-from ..results.records import Branch, Equilibrium, SpecialPoint
+from ..quantities import PLACES
+from ..results.branch import Branch
+from ..results.equilibrium import Equilibrium
+from ..results.special_point import SpecialPoint
 from ..scene import Analysis, Scene
 from .follow import equilibrium, run
 from .search import equilibria
@@ -75,7 +78,7 @@ def compute(scene: Scene, quantity: str, options: Options) -> Row:
     """The row of one scene; whatever goes wrong is in its status and message."""
     clock = time.perf_counter()
     try:
-        row = QUANTITIES[quantity](scene, options)
+        row = COMPUTED[quantity](scene, options)
     except FemmembraneError as error:
         status = str(error.status) if isinstance(error, SolveError) else "bad input"
         row = Row(status, str(error), {})
@@ -86,7 +89,7 @@ def compute(scene: Scene, quantity: str, options: Options) -> Row:
 
 def check(scene: Scene, quantity: str, options: Options) -> None:
     """Raise InputError for an unknown quantity, and for one that this scene with these options does not have."""
-    choice("quantity", quantity, QUANTITIES)
+    choice("quantity", quantity, COMPUTED)
     given = {name: value for name, value in (("pressure", options.pressure), ("volume", options.volume)) if value is not None}
     if quantity == "equilibria":
         if len(given) != 1:
@@ -131,7 +134,7 @@ def _traced(scene: Scene, options: Options, special_points: bool = True, ended: 
 
 def _row(scene: Scene, branch: Branch) -> Row:
     """The curve of a branch, and where it turns."""
-    values: Values = {name: branch.column(name) for name in ("volume", "pressure", "center_height")}
+    values: Values = {name: branch.column(name) for name in PLACES}
     values["steps"] = len(branch)
     if branch.special_points is not None:
         for kind, tag in (("limit_point", "limit"), ("volume_fold", "fold"), ("azimuthal_onset", "onset")):
@@ -139,7 +142,7 @@ def _row(scene: Scene, branch: Branch) -> Row:
             if kind == "azimuthal_onset" and not scene.analysis.azimuthal_modes:
                 continue
             values[f"{kind}s"] = len(points)
-            for name in ("volume", "pressure", "center_height"):
+            for name in PLACES:
                 values[f"{tag}_{name}"] = _array(getattr(point, name) for point in points)
             if kind == "azimuthal_onset":
                 values["onset_waves"] = _array(point.azimuthal for point in points)
@@ -156,7 +159,7 @@ def _equilibria(scene: Scene, options: Options) -> Row:
     axisymmetric = np.array([eq.verdict(found.control).stable is True for eq in found], dtype=bool)
     upright = np.array([all(eq.verdict(azimuthal=n).stable is True for n in modes) for eq in found], dtype=bool)
     values: Values = {"equilibria": len(found), "stable_equilibria": int((axisymmetric & upright).sum())}
-    for name in ("volume", "pressure", "center_height"):
+    for name in PLACES:
         values[f"state_{name}"] = _array(getattr(eq, name) for eq in found)
     values["state_energy"] = np.array(found.energies)
     values["state_stable"] = (axisymmetric & upright).astype(float)
@@ -228,15 +231,14 @@ def _where_compressed(scene: Scene, before: Equilibrium, after: Equilibrium, cri
 
 
 def _place(tag: str, point: Any) -> Values:
-    names = ("volume", "pressure", "center_height")
-    return {f"{tag}_{name}": np.nan if point is None else float(getattr(point, name)) for name in names}
+    return {f"{tag}_{name}": np.nan if point is None else float(getattr(point, name)) for name in PLACES}
 
 
 def _array(numbers: Iterable[float]) -> Any:
     return np.array(list(numbers), dtype=float)
 
 
-QUANTITIES: Mapping[str, Compute] = {
+COMPUTED: Mapping[str, Compute] = {
     "run": _run,
     "branch": _branch,
     "equilibria": _equilibria,

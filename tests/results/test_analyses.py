@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.quantities import Quantity
 from femmembrane.results import output, table
 from femmembrane.results.analyses import ANALYSES, EXTRA, asked
 from femmembrane.results.analyses.base import Drawing, EquilibriumAnalysis, PrintedColumn, Section, Table
-from femmembrane.results.quantities import Quantity
 from femmembrane.scene import Perturbations
-
-from .cases import disc_scene
+from tests.cases import disc_scene
 
 
 class Side(EquilibriumAnalysis):

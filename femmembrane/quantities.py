@@ -1,0 +1,287 @@
+"""Every quantity that is shown or stored: what it is, its unit, and how it is written.
+
+Tables, CSV and NetCDF files, pictures, pages and sweeps ask here. A new quantity is one line of :data:`QUANTITIES`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: SI unit of every kind of quantity that :class:`~femmembrane.Scales` converts
+SI_UNITS: Mapping[str, str] = {
+    "length": "m",
+    "volume": "m^3",
+    "pressure": "Pa",
+    "stress": "Pa",
+    "energy": "J",
+    "dipole_strength": "A m^2",
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of tables, files and pictures.
+
+    Attributes
+    ----------
+    meaning : str
+        What it is, in words: ``long_name`` in files.
+    unit : str
+        1 for a non-dimensional one.
+    symbol : str
+        Heading of its column where that is narrow; empty where its words are the heading.
+    words : str
+        What sentences and wide tables call it; empty where that is its name, with blanks.
+    label : str
+        Text at an axis, with what it is divided by; empty where its words are the text.
+    form : str
+        Format of its values in tables of text.
+    si : str
+        Its kind among :data:`SI_UNITS`; empty for what has no value in SI units.
+    type : {float, int, str}
+        What its values are in files and columns.
+    """
+
+    meaning: str
+    unit: str = "1"
+    symbol: str = ""
+    words: str = ""
+    label: str = ""
+    form: str = ".6g"
+    si: str = ""
+    type: type[float] | type[int] | type[str] = float
+
+
+class Converter(Protocol):
+    """What turns non-dimensional values into SI units: :class:`~femmembrane.Scales`."""
+
+    def to_si(self, quantity: str, value: Any, /) -> Any: ...
+
+
+_STRESSES = {
+    "mechanical_stress_1": "meridional mechanical stress",
+    "mechanical_stress_2": "circumferential mechanical stress",
+    "total_stress_1": "meridional total stress",
+    "total_stress_2": "circumferential total stress",
+}
+#: every quantity that is shown or stored, by the name that it has in tables and files
+QUANTITIES: Mapping[str, Quantity] = {
+    "step": Quantity("number of the equilibrium along the branch", type=int),
+    "volume": Quantity("enclosed volume V/R0^3, signed", symbol="V", label="volume V/R₀³", si="volume"),
+    "volume_m3": Quantity("enclosed volume, signed", "m^3"),
+    "pressure": Quantity("pressure P = p R0/(mu T)", symbol="P", label="pressure P = pR₀/(μT)", form=".8g", si="pressure"),
+    "pressure_pa": Quantity("pressure p", "Pa"),
+    "center_height": Quantity(
+        "height of the pole, or the first point of the meridian, over R0", words="pole height", label="pole height η(0)/R₀", si="length"
+    ),
+    "energy": Quantity("elastic, magnetic and load energy over mu T R0^2", symbol="E total", words="total energy", form=".8g", si="energy"),
+    "elastic_energy": Quantity("elastic energy over mu T R0^2", symbol="E elastic", si="energy"),
+    "magnetic_energy": Quantity("magnetic energy over mu T R0^2", symbol="E magnetic", si="energy"),
+    "load_energy": Quantity("energy of the loads over mu T R0^2", symbol="E loads", si="energy"),
+    "residual": Quantity("out-of-balance force relative to the forces in balance"),
+    "iterations": Quantity("solver iterations, rejected attempts included", type=int),
+    "seconds": Quantity("wall time spent on the equilibrium", "s"),
+    "status": Quantity("how the solve ended", type=str),
+    "state": Quantity("displacement coefficients over R0 on the free degrees of freedom"),
+    "r": Quantity("reference radius of the node over R0", label="reference radius r/R₀", si="length"),
+    "s": Quantity(
+        "arc length of the reference meridian from its first end to the node, over R0",
+        label="arc length of the reference meridian s/R₀",
+        si="length",
+    ),
+    "rho": Quantity("deformed radius over R0", label="radius ρ/R₀", si="length"),  # noqa: RUF001
+    "eta": Quantity("deformed height over R0", label="height η/R₀", si="length"),
+    "r_m": Quantity("reference radius of the node", "m"),
+    "rho_m": Quantity("deformed radius", "m"),
+    "eta_m": Quantity("deformed height", "m"),
+    "stretch_1": Quantity("meridional stretch"),
+    "stretch_2": Quantity("circumferential stretch"),
+    **{name: Quantity(f"{stress} over mu", si="stress") for name, stress in _STRESSES.items()},
+    **{f"{name}_pa": Quantity(stress, "Pa") for name, stress in _STRESSES.items()},
+    "kind": Quantity("kind of the special point", type=str),
+    "error": Quantity("uncertainty of the special point's location"),
+    "tangent": Quantity("direction of the branch on which it was found, in the unknowns and the pressure"),
+    "azimuthal": Quantity("number of waves around the axis of the instability that sets in", type=int),
+    "trace_border": Quantity("softest displacement at the last point of a trace over a number"),
+    "trace_sigma": Quantity("arc length, or load, at the last points of the path"),
+    "trace_point": Quantity("state and pressure at the last points of the path"),
+    "trace_slope": Quantity("their derivatives with respect to arc length or load"),
+    "jump_index": Quantity("number of the equilibrium that a snap of the membrane landed on", type=int),
+    "jump_limit": Quantity("whether the fold before the snap was located", type=int),
+    "fraction_taut": Quantity("part of the reference area that is taut"),
+    "fraction_radial": Quantity("part of the reference area with radial wrinkles (only s22 < 0)"),
+    "fraction_circumferential": Quantity("part of the reference area with circumferential wrinkles (only s11 < 0)"),
+    "fraction_double": Quantity("part of the reference area with wrinkles both ways (s11 < 0 and s22 < 0)"),
+    "error_pressure": Quantity("estimated error of the pressure, relative"),
+    "error_volume": Quantity("estimated error of the volume, relative"),
+    "error_energy": Quantity("estimated error of elastic plus magnetic energy, over the sum of their sizes"),
+    "estimated": Quantity("quantity whose error is estimated"),
+    "error_value": Quantity("quantity at the equilibrium whose error is estimated"),
+    "error_estimate": Quantity("its estimated error, signed"),
+    "error_control": Quantity("what is held while the error is estimated"),
+    "error_method": Quantity("how the error is estimated"),
+    "error_reason": Quantity("why there is no estimate of the error"),
+    "zone_step": Quantity("number of the equilibrium that the zone belongs to"),
+    "zone_kind": Quantity("kind of the zone"),
+    "zone_r_start": Quantity("reference radius over R0 at which the zone starts"),
+    "zone_r_end": Quantity("reference radius over R0 at which the zone ends"),
+    "zone_rho_start": Quantity("deformed radius over R0 at which the zone starts"),
+    "zone_rho_end": Quantity("deformed radius over R0 at which the zone ends"),
+    "zone_area_fraction": Quantity("part of the reference area in the zone"),
+    "zone_deformed_area_fraction": Quantity("part of the deformed area in the zone"),
+    # of convergence studies
+    "degree": Quantity("degree of the elements", type=int),
+    "elements": Quantity("number of elements", type=int),
+    "unknowns": Quantity("number of unknowns", words="unknowns", type=int),
+    "element_size": Quantity("largest element over R0", label="largest element h/R₀"),
+    "quantity": Quantity("what is compared", type=str),
+    "value": Quantity("what was found"),
+    "reference": Quantity("the same on the reference mesh"),
+    "floor": Quantity("error of the reference in the same measure"),
+    "resolved": Quantity("whether the error stands clear of that of the reference", type=int),
+    "order": Quantity("observed order"),
+    "extrapolated": Quantity("value for infinitely many elements"),
+    "extrapolated_error": Quantity("its estimated error"),
+    "profile_l2": Quantity("error of the profile in L2", symbol="profile L2", label="profile (ρ, η), L² norm"),  # noqa: RUF001
+    "profile_h1": Quantity("error of the profile in H1", symbol="profile H1", label="profile (ρ, η), H¹ norm"),  # noqa: RUF001
+    "limit_pressure": Quantity("pressure at the first limit point", symbol="limit P", label="first limit point, P"),
+    "limit_volume": Quantity("volume at the first limit point", symbol="limit V", label="first limit point, V"),
+    # of studies of work against precision
+    "what": Quantity("kind of the line: solve, stage or effect", type=str),
+    "method": Quantity("solver or method; name of the stage or effect", type=str),
+    "start": Quantity("warm or cold; of an effect, off or on", type=str),
+    "tolerance": Quantity("tolerance of a method without a mesh"),
+    "milliseconds": Quantity("median wall time", "ms", label="wall time of one equilibrium in ms"),
+    "setup_milliseconds": Quantity("wall time of building the problem", "ms"),
+    "evaluations": Quantity("evaluations of the right-hand sides", type=int),
+    "repeats": Quantity("number of solves that the median is of", type=int),
+    "converged": Quantity("whether the solve converged", type=int),
+    "front": Quantity("whether nothing with the same start is both faster and more accurate", type=int),
+    "message": Quantity("the reason, or what was done", type=str),
+    "machine": Quantity("processor, number of processors, system and versions", type=str),
+    # of sweeps, one value a scene or a series of them
+    "steps": Quantity("number of equilibria along the branch", words="number of equilibria along the branch"),
+    "limit_points": Quantity("number of limit points", words="number of limit points"),
+    "volume_folds": Quantity("number of volume folds", words="number of volume folds"),
+    "azimuthal_onsets": Quantity("number of azimuthal onsets", words="number of azimuthal onsets"),
+    "onset_waves": Quantity("number of waves around the axis of the onsets"),
+    "wrinkled_fraction": Quantity("part of the reference area that is wrinkled, along the branch"),
+    "largest_wrinkled_fraction": Quantity(
+        "largest part of the reference area that is wrinkled on the branch", label="largest wrinkled part of the area"
+    ),
+    "equilibria": Quantity("number of equilibria at the load that were found", label="number of equilibria"),
+    "stable_equilibria": Quantity(
+        "number of them that are stable under the load's control and against the waves asked for", label="number of stable equilibria"
+    ),
+    "state_energy": Quantity("energy that orders the equilibria, over mu T R0^2"),
+    "state_stable": Quantity("whether each equilibrium is stable (1 or 0)"),
+    "upright_at_start": Quantity("whether the branch starts stable against one wave around the axis (1 or 0)"),
+    "outcome": Quantity("whether and where the onset was met", type=str),
+    "has_result": Quantity("whether anything was computed of the scene", type=int),
+}
+#: the quantities that tell where on a branch an equilibrium lies
+PLACES = ("volume", "pressure", "center_height")
+#: stretches and stresses along the meridian
+PROFILE = ("stretch_1", "stretch_2", *_STRESSES)
+#: of the quantities of a verdict, whose names go on with a control or the number of waves
+_OF_VERDICTS: Mapping[str, Quantity] = {
+    "lambda_error": Quantity("bound on the algebraic error of the smallest eigenvalue"),
+    "lambda": Quantity("smallest eigenvalue, omega^2 rho_m R0^2/mu", label="smallest eigenvalue λ"),
+    "verdict": Quantity("stability", type=str),
+    "negative_directions": Quantity("number of negative eigenvalues (-1: not counted)", type=int),
+    "reason": Quantity("reason of the verdict", type=str),
+    "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
+}
+#: what follows the name of a quantity of each kind where it is given in SI units
+_IN_SI = {"length": "m", "volume": "m3", "pressure": "pa", "stress": "pa"}
+#: labels of numbers of a scene, by the pattern of their key
+_KEYS = (
+    (r"source(?:\.\d+)?\.strength", "dipole strength M = μ₀D²/(R₀⁶μ)"),
+    (r"source(?:\.\d+)?\.height", "height of the source h/R₀"),
+    (r"membrane\.susceptibility", "susceptibility χ"),
+    (r"material\.mu\.(\d+)", "modulus of term {0} over the shear modulus, μ{0}/μ"),
+    (r"material\.alpha\.(\d+)", "exponent of term {0}, α{0}"),  # noqa: RUF001
+    (r"run\.start", "first load"),
+    (r"run\.stop", "last load"),
+)
+
+
+def quantity(name: str) -> Quantity:
+    """What is known of a quantity; of one that is not listed, its name."""
+    return QUANTITIES.get(name) or _of_verdict(name) or Quantity(name)
+
+
+def _of_verdict(name: str) -> Quantity | None:
+    """A quantity of a verdict: its name ends in a control, or in n and the number of waves, and perhaps a part."""
+    kind = next((k for k in _OF_VERDICTS if f"{name}_".startswith(f"{k}_")), None)
+    if kind is None or kind == name:
+        return _OF_VERDICTS.get(name)
+    tag, _, part = name.removeprefix(kind + "_").partition("_")
+    waves, known = tag[1:].isdigit(), _OF_VERDICTS[kind]
+    against = f"azimuthal mode n = {tag[1:]}" if waves else f"axisymmetric shapes under {tag} control"
+    return Quantity(
+        f"{known.meaning}, {against}" + (f": {part}" if part else ""),
+        symbol=f"{kind} ({QUANTITIES[tag].symbol})" if kind == "lambda" and tag in PLACES else "",
+        label="λ, " + (f"n = {tag[1:]}" if waves else f"{tag} held") if kind == "lambda" else "",
+        type=known.type,
+    )
+
+
+def words(name: str) -> str:
+    """What sentences and wide tables call a quantity."""
+    return quantity(name).words or name.replace("_", " ")
+
+
+def heading(name: str) -> str:
+    """The heading of a column where a person reads the table."""
+    return quantity(name).symbol or words(name)
+
+
+def title(name: str) -> str:
+    """Words and symbol of a quantity, such as "pressure P"."""
+    known = quantity(name)
+    return f"{words(name)} {known.symbol}" if len(known.symbol) == 1 else words(name)
+
+
+def axis_label(name: str) -> str:
+    """Text at an axis."""
+    return quantity(name).label or words(name)
+
+
+def key_label(key: str) -> str:
+    """Text at an axis over a number of a scene; its key where nothing better is known."""
+    for pattern, text in _KEYS:
+        if match := re.fullmatch(pattern, key):
+            return text.format(*(int(k) + 1 for k in match.groups()))  # terms are counted from 1
+    return key
+
+
+def written(name: str, value: Any, width: int = 0) -> str:
+    """A value as tables of text have it, at the right of so many characters."""
+    return f"{value:>{width or ''}{quantity(name).form}}"
+
+
+def caption(volume: float, pressure: float, between: str = "  ") -> str:
+    """Volume and pressure of an equilibrium at a curve or in a line, to four digits."""
+    return f"{QUANTITIES['volume'].symbol} = {volume:.4g}{between}{QUANTITIES['pressure'].symbol} = {pressure:.4g}"
+
+
+def in_si(name: str) -> str:
+    """The name of a quantity that is given in SI units."""
+    return f"{name}_{_IN_SI[QUANTITIES[name].si]}"
+
+
+def si_values(values: Mapping[str, Any], scales: Converter) -> dict[str, Any]:
+    """Quantities in SI units, under their names there."""
+    return {in_si(name): scales.to_si(QUANTITIES[name].si, value) for name, value in values.items()}
+
+
+def typed(name: str, values: Iterable[Any]) -> NDArray[Any]:
+    """Values of a quantity as an array of its type, whatever their number."""
+    return np.array(list(values), dtype={float: np.float64, int: np.int64, str: np.str_}[quantity(name).type])

@@ -1,0 +1,291 @@
+"""One equilibrium of a scene: what was computed, and the door to all that may be asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import choice
+from ..discretization.meridian import LEAST_LENGTH
+from ..errors import InputError, Status
+from ..scene import WRINKLING
+from ..scene.variation import Parameter
+from ..solve.controls import control_kind
+from ..threads import one_thread
+from . import door
+
+if TYPE_CHECKING:
+    from ..potential import Potential
+    from ..scene import Scene
+    from ..solve.controls import Gas
+    from .error_estimate import ErrorEstimate
+    from .verdict import Verdict
+    from .vibration import Vibration
+    from .zones import Zones
+
+Array = NDArray[np.float64]
+
+#: what an answer is remembered under: the kind of question, then what tells two of its kind apart
+Key = tuple[Hashable, ...]
+T = TypeVar("T")
+#: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
+_OF_POTENTIAL = ("verdict", "errors")
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """One equilibrium of a scene, as :func:`femmembrane.equilibrium` and the items of a :class:`Branch` are.
+
+    Attributes
+    ----------
+    pressure : float
+        P = p R0/(mu T).
+    volume : float
+        Enclosed volume over R0^3, signed, with the 2 pi.
+    center_height : float
+        Height of the pole over R0. A shape without a pole gives the height of the first point of its meridian.
+    elastic_energy, magnetic_energy : float
+        In units of mu T R0^2, with the 2 pi; the magnetic one is 0 without sources.
+    residual : float
+        Largest out-of-balance force at a node, relative to the forces that meet there; recomputed after the solve.
+    iterations : int
+        Iterations spent on this equilibrium, rejected attempts included.
+    status : Status
+    scene : Scene
+    state : ndarray, shape (n_free,)
+        Displacement coefficients of the free degrees of freedom (read-only).
+    seconds : float
+        Wall time spent on this equilibrium and its verdicts.
+    gas : Gas or None
+        The enclosed gas that holds it, when found under gas control.
+    load_energy : float
+        Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without loads.
+
+    Examples
+    --------
+    >>> import femmembrane as fm
+    >>> eq = fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volume=1.0)
+    >>> print(f"P = {eq.pressure:.4f}, pole at {eq.center_height:.4f}, {eq.verdict('pressure').word} at a held pressure")
+    P = 1.0669, pole at 0.5528, stable at a held pressure
+    >>> shape = eq.profile([0.0, 0.5])
+    >>> [round(float(eta), 4) for eta in shape["eta"]], [round(float(stretch), 4) for stretch in shape["stretch_1"]]
+    ([0.5528, 0.4115], [1.2186, 1.202])
+    """
+
+    pressure: float
+    volume: float
+    center_height: float
+    elastic_energy: float
+    magnetic_energy: float
+    residual: float
+    iterations: int
+    status: Status
+    scene: Scene = field(repr=False)
+    state: Array = field(repr=False)
+    seconds: float = field(default=0.0, repr=False)
+    gas: Gas | None = field(default=None, repr=False)
+    load_energy: float = field(default=0.0, repr=False)
+    _answers: dict[Key, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def energy(self) -> float:
+        """Elastic, magnetic and load energy."""
+        return self.elastic_energy + self.magnetic_energy + self.load_energy
+
+    @property
+    def potential(self) -> Potential:
+        """The discrete potential of the scene; it is built once."""
+        from ..potential import potential_of
+
+        return potential_of(self.scene)
+
+    def number(self, name: str) -> float:
+        """A number of its scene.
+
+        Parameters
+        ----------
+        name : str
+            As :mod:`femmembrane.scene.variation` has it: ``source.0.height``.
+
+        Raises
+        ------
+        InputError
+            For a name that the scene does not have.
+        """
+        return Parameter(self.scene, name).value
+
+    def in_scene(self, scene: Scene) -> Equilibrium:
+        """The same equilibrium in a scene with the same potential, which may have other scales and other analyses.
+
+        Parameters
+        ----------
+        scene : Scene
+        """
+        return replace(self, scene=scene, _answers={key: answer for key, answer in self._answers.items() if key[0] in _OF_POTENTIAL})
+
+    def remembered(self, key: Key, find: Callable[[], T]) -> T:
+        """The answer to a question, which is asked once and remembered.
+
+        Parameters
+        ----------
+        key : tuple
+            The kind of question, then what tells two of its kind apart.
+        find : callable
+            Who answers.
+        """
+        if key not in self._answers:
+            self._answers[key] = find()
+        answer: T = self._answers[key]
+        return answer
+
+    def remember(self, key: Key, answer: Any) -> None:
+        """Take an answer that was found before, such as one that stood in a file.
+
+        Parameters
+        ----------
+        key : tuple
+            As in :meth:`remembered`.
+        answer : object
+        """
+        self._answers[key] = answer
+
+    def profile(self, r: ArrayLike | None = None) -> dict[str, Array]:
+        """The deformed meridian with stretches and stresses.
+
+        Parameters
+        ----------
+        r : array_like, optional
+            Reference radii in [0, 1]. For a meridian that does not run along the radius: arc lengths over R0 from its first end. Default:
+            the nodes, from the first end (the pole) to the last (the rim).
+
+        Returns
+        -------
+        dict of ndarray
+            r, rho, eta over R0, and s, the arc length, where it is not r; stretch_1 (meridional) and stretch_2 (circumferential); the
+            Cauchy stresses mechanical_stress_1, mechanical_stress_2, total_stress_1 and total_stress_2, in units of mu. A scene with scales
+            has the stresses in Pa as well, under the same names with ``_pa`` at the end.
+
+        Raises
+        ------
+        InputError
+            For radii outside the membrane.
+        """
+        space = self.potential.space
+        s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
+        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+
+    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
+        """Stability against one class of perturbations; computed once and remembered.
+
+        Parameters
+        ----------
+        control : {"pressure", "volume", "gas"}
+            What is held against axisymmetric perturbations. Left out for azimuthal perturbations, which do not change the volume.
+        azimuthal : int
+            Number of waves around the axis; 0 for axisymmetric perturbations.
+        gas : Gas, optional
+            For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found.
+
+        Raises
+        ------
+        InputError
+            For an unknown control, or for arguments that do not go together.
+        """
+        if not (control is None or isinstance(control, str)) or not isinstance(azimuthal, (int, np.integer)):
+            raise InputError(
+                "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
+                control or azimuthal,
+                "a name and a number are allowed",
+            )
+        if gas is not None and control != "gas":
+            raise InputError("gas", gas, 'allowed with control "gas" only')
+        gas = gas or self.gas if control == "gas" else None
+        key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
+        return self.remembered(key, lambda: self._judged(control, azimuthal, gas))
+
+    @one_thread
+    def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+        evaluation = self.potential.evaluate(self.state, self.pressure)
+        compliance = gas.compliance(self.volume) if gas else None
+        return door.checked_verdict(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+
+    @one_thread
+    def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:
+        """The lowest natural modes, in order of their eigenvalues and proved to be the lowest.
+
+        Parameters
+        ----------
+        azimuthal : int
+            Number of waves around the axis; 0 for axisymmetric modes.
+        count : int
+            How many modes.
+        control : {"pressure", "volume"}
+            What is held during the motion. It makes a difference for axisymmetric modes only.
+
+        Raises
+        ------
+        InputError
+            For an argument that is not allowed.
+        SolveError
+            Where a compressive stress leaves the spectrum without a lowest eigenvalue.
+        """
+        return door.natural_frequencies(self.potential, self.state, self.pressure, azimuthal, count, control)
+
+    def zones(self, criterion: str | None = None) -> Zones:
+        """Taut and wrinkled zones by the signs of the principal stresses, from the pole to the rim; computed once and remembered.
+
+        Zones thinner than about a tenth of an element may be missed.
+
+        Parameters
+        ----------
+        criterion : {"total", "mechanical"}, optional
+            The stresses that decide. Default: ``analysis.wrinkling`` of the scene, or "total".
+
+        Raises
+        ------
+        InputError
+            For an unknown criterion.
+        """
+        criterion = choice("criterion", self.scene.analysis.zone_criterion if criterion is None else criterion, WRINKLING)
+        return self.remembered(("zones", criterion), lambda: door.find_zones(self.scene, self.state, self.pressure, criterion))
+
+    @one_thread
+    def error_estimate(self, control: str = "volume") -> ErrorEstimate:
+        """Estimated discretisation errors, from the same load in a finer space; computed once and remembered.
+
+        Some states have no estimate: compressed and slack ones, states too close to a fold in what is held, states on a mesh too coarse.
+        Their errors are NaN, and the record says why. In a wrinkled tension field the estimate is rough, a factor of two or so.
+
+        Parameters
+        ----------
+        control : {"volume", "pressure", "center_height"}
+            What is held. The other quantities are compared at the same volume, pressure or pole height.
+
+        Raises
+        ------
+        InputError
+            For an unknown control.
+        """
+        held = control_kind(control).name
+
+        def estimate() -> ErrorEstimate:
+            verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
+            return door.estimate_errors(self.potential, self.state, self.pressure, held, verdicts)
+
+        return self.remembered(("errors", held), estimate)
+
+    def _repr_html_(self) -> str:
+        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        return door.equilibrium_html(self)
+
+
+def _places(r: ArrayLike, ends: Array, what: str) -> Array:
+    s = np.atleast_1d(np.asarray(r, dtype=float))
+    margin = LEAST_LENGTH * float(ends[-1])  # a computed end is exact to round-off only
+    if not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
+        raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
+    return np.clip(s, ends[0], ends[-1])

@@ -1,0 +1,62 @@
+"""Special points of a branch, and the snaps that start there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .equilibrium import Equilibrium
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A point of a branch where something changes.
+
+    Attributes
+    ----------
+    kind : str
+        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset; over a number of the scene number_fold,
+        where that is stationary.
+    volume, pressure, center_height : float
+        Of its equilibrium.
+    error : float
+        Estimated relative distance of the located point from the exact point of the discrete branch.
+    equilibrium : Equilibrium
+    azimuthal : int
+        For an azimuthal onset: the number of waves against which stability is lost or regained there.
+    tangent : ndarray, shape (n_free + 1,), or None
+        For a branch point of one scene: the direction in (x, P) of the branch on which it was found. It tells this branch from the
+        crossing one.
+    """
+
+    kind: str
+    volume: float
+    pressure: float
+    center_height: float
+    error: float
+    equilibrium: Equilibrium = field(repr=False)
+    azimuthal: int = field(default=0, kw_only=True)
+    tangent: Array | None = field(default=None, repr=False, kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """A snap of a run from one part of the branch to another, or to another branch.
+
+    Attributes
+    ----------
+    index : int
+        Position in the branch of the equilibrium landed on.
+    limit : SpecialPoint or None
+        The fold at which the branch turned back before the load, or the branch point at which it lost its stability. From a branch point
+        another branch leads to the landing.
+    landing : Equilibrium
+    """
+
+    index: int
+    limit: SpecialPoint | None
+    landing: Equilibrium

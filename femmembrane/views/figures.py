@@ -1,0 +1,128 @@
+"""Frames of pictures: a figure, its legend, its file, and the styles that tell verdicts apart.
+
+Figures are made without pyplot, so that nothing global changes and no window opens. Line style and marker shape carry all that colour does:
+the figures read the same in grey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..files import replace_file
+from .backend import drawing, load, title_text
+from .zones import zone_order
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..results.equilibrium import Equilibrium
+
+_DPI = 160
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a class of equilibria is drawn and named."""
+
+    label: str
+    dashes: Any
+    color: str
+    width: float = 1.8
+
+
+SOLID, DASHED, DOTTED = "-", (0, (5, 2)), (0, (1, 1.4))
+BLUE, ORANGE, BLACK, RED = "#0072b2", "#d55e00", "#222222", "#a01040"
+PLAIN = Style("", SOLID, BLUE)
+MARGINAL = Style("marginal (an eigenvalue is zero)", (0, (6, 1.5, 1, 1.5)), BLACK)
+BOTH = Style("stable under both controls", SOLID, BLUE)
+VOLUME_ONLY = Style("stable under volume control only", DASHED, ORANGE)
+UNSTABLE = Style("unstable under both controls", DOTTED, BLACK, 2.2)
+#: compressed or slack along the meridian: what a mesh finds there depends on the mesh, stable or not
+ILL_POSED = Style("ill-posed (compressed or slack)", DOTTED, "#888888", 1.2)
+#: when one control alone was asked for
+STABLE_UNDER = {c: Style(f"stable under {c} control", SOLID, BLUE) for c in ("pressure", "volume")}
+UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) for c in ("pressure", "volume")}
+
+#: the order of the lines in a legend
+_ORDER = [s.label for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED)]
+#: in place of a verdict
+ILL_POSED_WORD = "ill-posed"
+
+
+def verdict_style(equilibrium: Equilibrium, controls: Sequence[str] = ("pressure", "volume")) -> Style:
+    """How an equilibrium is drawn for its verdicts under some controls."""
+    return style_of({c: equilibrium.verdict(c).word for c in controls})
+
+
+def style_of(words: Mapping[str, str]) -> Style:
+    """The style of a class of equilibria: the verdict under each control asked for."""
+    if not words:
+        return PLAIN
+    if ILL_POSED_WORD in words.values():
+        return ILL_POSED
+    if "marginal" in words.values():
+        return MARGINAL
+    if len(words) == 1:
+        ((control, word),) = words.items()
+        return (STABLE_UNDER if word == "stable" else UNSTABLE_UNDER)[control]
+    return UNSTABLE if words["volume"] == "unstable" else BOTH if words["pressure"] == "stable" else VOLUME_ONLY
+
+
+def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[float] = (1.0,)) -> tuple[Figure, Any]:
+    """A figure of a size in inches with one axes, or a row of several of the given relative widths.
+
+    Returns
+    -------
+    figure : Figure
+    axes : Axes, or array of Axes
+    """
+    load()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
+    for axes in row:
+        axes.spines[["top", "right"]].set_visible(False)
+    look: dict[str, Any] = {"fontsize": 11, "wrap": True, "parse_math": False}
+    if len(widths) > 1:
+        figure.suptitle(title_text(title) or title, **look)  # a blank one leaves room
+        return figure, row
+    row[0].set_title(title_text(title), **look)
+    return figure, row[0]
+
+
+def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
+    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes."""
+    if path is not None:
+        formats = figure.canvas.get_supported_filetypes()
+        if Path(path).suffix[1:].lower() not in formats:
+            raise InputError(
+                "path", str(path), "a name that ends in one of these is needed: " + ", ".join(f".{f}" for f in sorted(formats))
+            )
+        with replace_file(path) as temporary, drawing():
+            figure.savefig(temporary, dpi=_DPI)
+    return figure
+
+
+def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
+    """A legend of what is named, if anything is; ``look`` goes to Matplotlib's ``legend``."""
+    handles, labels = legend_entries(axes)
+    if handles:
+        usual: dict[str, Any] = {"fontsize": 9, "title_fontsize": 9, "framealpha": 0.9, "edgecolor": "none", "handlelength": 3.2}
+        legend = axes.legend(handles, labels, title=heading, **(usual | look))
+        legend.set_alignment("left")
+
+
+def legend_entries(axes: Axes) -> tuple[list[Any], list[str]]:
+    """Handles and labels of what is named, the verdicts first, then wrinkles, and these always in the same order."""
+    named = list(zip(*axes.get_legend_handles_labels(), strict=True))
+    named.sort(key=lambda item: _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER) + zone_order(item[1]))
+    return [handle for handle, _ in named], [label for _, label in named]

@@ -73,6 +73,7 @@ from .verbs import inflate as inflate
 from .verbs import pressurize as pressurize
 from .verbs import run as run
 from .verbs import trace_iter as trace_iter
+from .verbs import vary as vary
 from .verbs.convergence import convergence as convergence
 from .verbs.cost import cost as cost
 from .verbs.sweep import plan_sweep as plan_sweep

@@ -27,10 +27,15 @@ from ..errors import SolveError, Status
 from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .branch import AT_CROSSING, FOLDS, BranchProblem
-from .continuation import BranchPoint, CurveProblem
-from .controls import CONTROLS, Control, PressureControl
+from .continuation import BranchPoint, CurveProblem, StepControl, Tracer, trace_points
+from .controls import CONTROLS, Control, GasOver, PressureControl, at_number
 from .newton import TOLERANCE, relative_residual, relative_size
+from .search import FAR, Limit
+from .segment import Located, Segment
+from .special_points import branch_point
+from .start import moderate
 from .state import Predictor, State
+from .wellposed import ill_posed
 
 #: name of the number among the quantities of a curve, and of a point at which it is stationary among the folds
 NUMBER, TURN = "number", "number_fold"
@@ -291,8 +296,11 @@ def _hyperplane(row: Array, guess: Array) -> _Closing:
 
 def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:
     """Value and derivatives of a control with respect to (x, P, m)."""
-    gap, row, corner = control.equation(equations.problem.family.space, equations.x, equations.pressure, equations.evaluation)
-    return gap, np.concatenate([row, [corner, 0.0]])
+    state = equations.x, equations.pressure, equations.evaluation
+    control = at_number(control, equations.number)
+    gap, row, corner = control.equation(equations.problem.family.space, *state)
+    rate = control.number_rate(equations.pressure, equations.evaluation.volume) if isinstance(control, GasOver) else 0.0
+    return gap, np.concatenate([row, [corner, rate]])
 
 
 class ControlledProblem(NumberProblem):
@@ -340,6 +348,60 @@ class _Controlled(Equations):
     def linearise(self) -> None:
         self.gap, self.gap_row = _controlled(self, self.problem.control)
         self.force_number = self.problem.family.number_derivative(self.x, self.pressure, self.number)
+
+
+def beyond_turn(
+    problem: ControlledProblem,
+    point: NumberPoint,
+    number: float,
+    stable: Callable[[State], bool],
+    *,
+    any_before: bool,
+    beside: Callable[[Located[NumberPoint]], State | None],
+    max_steps: int = 300,
+) -> Limit:
+    """Follow a branch from the last point before a number that was not reached by steps in the number itself.
+
+    Where it turns back the next stable state is looked for beside it, then farther along it.
+
+    Parameters
+    ----------
+    problem, point : ControlledProblem, NumberPoint
+        Where it sets out, oriented towards the number.
+    number : float
+    stable : callable
+        Whether a state is a minimum under the control.
+    any_before : bool
+        Whether a state before the turn will do that is none.
+    beside : callable
+        The stable state that the membrane goes to from a turn, at the number; None where none was met.
+    """
+    family, fold, last = problem.family, None, point.state
+    points = trace_points(problem, point, Tracer(Predictor(), StepControl().first))
+    for _ in range(max_steps):
+        try:
+            new = next(points)
+        except SolveError:
+            break
+        segment = Segment(problem, point, new)
+        if ill_posed(family.member(new.number), new.state.evaluation) is not None:
+            return Limit(fold, None, new.state, last)
+        last = new.state
+        if fold is None:
+            found = [*segment.folds(TURN), *filter(None, [None if any_before else branch_point(segment)])]
+            fold = min(found, key=lambda located: located.point.sigma, default=None)
+            if fold is not None and fold.kind == TURN and not any(m.sigma < fold.point.sigma for m in segment.crossings(NUMBER, number)):
+                landing = beside(fold)
+                if landing is not None:
+                    return Limit(fold, landing, last=fold.point.state)
+        for met in segment.crossings(NUMBER, number):
+            before = fold is None or met.sigma < fold.point.sigma
+            if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
+                return Limit(None if before else fold, met.state, last=met.state)
+        if new.number in problem.bounds or abs(new.state.volume) > FAR * moderate(family):
+            break
+        point = new
+    return Limit(fold, None, last=last)
 
 
 def first_controlled(problem: ControlledProblem, x: Array, pressure: float, number: float, direction: int) -> NumberPoint:

@@ -173,7 +173,7 @@ def vary(
     >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), sources=[magnet], susceptibility=1.0)
     >>> branch = fm.vary(scene, "source.0.height", [4.0, 3.0, 2.5], hold={"pressure": 0.0})
     >>> [round(float(height), 4) for height in branch.column("center_height")]
-    [0.1065, 0.2393, 0.5638]
+    [0.1065, 0.2384, 0.5635]
     """
     check_scene(scene)
     common: dict[str, Any] = {"start": start, "solver": solver, "at_limit": at_limit, "throw": throw}

@@ -84,6 +84,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "elastic_energy": Quantity("elastic energy over mu T R0^2", symbol="E elastic", si="energy"),
     "magnetic_energy": Quantity("magnetic energy over mu T R0^2", symbol="E magnetic", si="energy"),
     "load_energy": Quantity("energy of the loads over mu T R0^2", symbol="E loads", si="energy"),
+    "gas": Quantity("amount of gas (P + atmosphere)(V + chamber) over mu T R0^2", words="amount of gas", label="amount of gas"),
     "residual": Quantity("out-of-balance force relative to the forces in balance"),
     "iterations": Quantity("solver iterations, rejected attempts included", type=int),
     "seconds": Quantity("wall time spent on the equilibrium", "s"),

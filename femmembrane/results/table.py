@@ -43,6 +43,7 @@ def columns(branch: Branch) -> list[str]:
         *("volume", "pressure", "center_height", "elastic_energy"),
         *(["magnetic_energy"] if scene.sources else []),
         *(["load_energy"] if scene.loads else []),
+        *(["gas"] if scene.chamber else []),
         *(name for analysis in asked(scene) for name in analysis.columns(scene)),
         *_LAST,
     ]
@@ -59,6 +60,8 @@ def reader(scene: Scene, column: str) -> Callable[[int, Equilibrium], Cell]:
     if own:
         value = own[0].value
         return lambda step, equilibrium: value(equilibrium, column)
+    if column == "gas":
+        return lambda step, equilibrium: equilibrium.gas_amount
     if "." in column:
         return lambda step, equilibrium: equilibrium.number(column)
     kind = int if column == "iterations" else float

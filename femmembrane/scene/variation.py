@@ -4,6 +4,7 @@
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
 ``membrane.susceptibility``  chi
+``chamber.NAME``         volume or atmosphere of the chamber of gas
 ``material.NAME``        a number of a material that has such an argument
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
 ``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
@@ -68,6 +69,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return float(self.scene.susceptibility or 0.0)
+        if part == "chamber":
+            return float(getattr(self.scene.chamber, rest))
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
         owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
@@ -87,6 +90,9 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return self.scene.replace(susceptibility=value)
+        if part == "chamber":
+            chamber: Any = self.scene.chamber
+            return self.scene.replace(chamber=dataclasses.replace(chamber, **{rest: value}))
         if part == "material":
             material: Any = self.scene.material
             if rest.startswith("mu."):
@@ -110,7 +116,9 @@ class Parameter:
         sources: tuple[Any, ...] = scene.sources
         loads: tuple[Any, ...] = scene.loads
         susceptibility = scene.susceptibility
-        if part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
+        if part == "chamber":  # of the control, and of no potential
+            pass
+        elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
         elif rest.startswith("alpha."):
             material = _with_exponent(material, int(rest[6:]), value)
@@ -156,6 +164,8 @@ def names(scene: Scene) -> list[str]:
     found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
     if scene.sources:
         found.append("membrane.susceptibility")
+    if getattr(scene, "chamber", None) is not None:
+        found += [f"chamber.{name}" for name in _numbers(scene.chamber)]
     material = scene.material
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]

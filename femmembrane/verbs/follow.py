@@ -14,12 +14,15 @@ from ..results.branch import Branch
 from ..results.checkpoint import same_scene
 from ..results.equilibrium import Equilibrium
 from ..scene import Scene
+from ..scene.run import GAS
 from ..solve.controls import CONTROLS, Controlled, Gas, control_kind
 from ..threads import one_thread
 from .arguments import check_scene
 from .load_run import LoadRequest, checked_loads
 from .meshing import on_chosen_mesh
 from .number_run import NumberRequest
+from .number_trace import NumberTraceRequest
+from .over_number import gas_of
 from .running import carry_out
 from .state_records import OnCheckpoint, OnStep
 from .trace_run import TraceRequest, checked_targets
@@ -275,13 +278,21 @@ def run(
     asked = scene.run
     if unfinished is not None:
         scene = same_scene(scene, unfinished, "unfinished")
+    number = asked.number
+    solved: dict[str, Any] = {"solver": asked.solver, "at_limit": asked.at_limit}
     observed: dict[str, Any] = {"on_step": on_step, "on_checkpoint": on_checkpoint, "unfinished": unfinished}
     if asked.control == "arc-length":
-        targets = checked_targets(asked.until)
-        request = TraceRequest(asked.start, targets, direction=asked.direction, max_steps=asked.max_steps)
+        request = TraceRequest(asked.start, checked_targets(asked.until) if number is None else {}, asked.direction or 1, asked.max_steps)
+        if number is not None:
+            more: dict[str, Any] = {"direction": asked.direction, "max_steps": asked.max_steps}
+            request = NumberTraceRequest.over_number(scene, asked.start, asked.until, over=number, hold=asked.hold, **more)
         return carry_out(on_chosen_mesh(scene, request), **observed)
-    loads = LoadRequest(control_kind(asked.control), asked.loads(), solver=asked.solver, at_limit=asked.at_limit)
-    return _follow(scene, loads, **observed)
+    if number is not None:
+        values_key = "run.values" if asked.values is not None else "run.start"
+        over = NumberRequest.checked(scene, asked.loads(), over=number, hold=asked.hold, key="run.control", values_key=values_key, **solved)
+        return _follow(scene, over, **observed)
+    held = gas_of(scene, "run.control") if asked.control == GAS else control_kind(asked.control)
+    return _follow(scene, LoadRequest(held, asked.loads(), **solved), **observed)
 
 
 def _follow(

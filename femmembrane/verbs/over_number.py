@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,14 +13,14 @@ from ..checks import number
 from ..errors import InputError, unknown_name
 from ..potential import Family, Potential
 from ..scene import Scene
-from ..scene.run import PRESCRIBED
+from ..scene.run import GAS, PRESCRIBED
 from ..scene.variation import Parameter, names
 from ..solve.continuation import BranchPoint
-from ..solve.controls import CONTROLS, Control, Controlled
+from ..solve.controls import CONTROLS, Control, Controlled, Gas, GasOver
 from ..solve.state import State
 
 #: the quantities that can be held, by the words that users have for them
-HELD = {**{name: name for name in CONTROLS}, **PRESCRIBED}
+HELD = {**{name: name for name in CONTROLS}, **PRESCRIBED, GAS: GAS}
 
 
 @dataclass(frozen=True)
@@ -31,10 +32,13 @@ class Hold:
     name : str
         Public name of the quantity.
     value : float
+    over : str
+        The number that changes, which may be one of the chamber of a gas.
     """
 
     name: str
     value: float
+    over: str = ""
 
     @classmethod
     def checked(cls, hold: Any, over: str) -> Hold:
@@ -45,7 +49,7 @@ class Hold:
         InputError
             When it is missing, holds nothing that can be held, or more than one quantity.
         """
-        known = ", ".join(CONTROLS)
+        known = ", ".join(dict.fromkeys(HELD.values()))
         if not isinstance(hold, Mapping) or len(hold) != 1:
             allowed = f"one quantity and its value are allowed, such as {{'pressure': 0.0}}; known: {known}"
             raise InputError("hold", hold, f"missing; over a number {allowed}" if hold is None else allowed)
@@ -55,12 +59,18 @@ class Hold:
         if isinstance(name, str) and "." in name:
             raise InputError("hold", name, f"a number of the scene is held anyway; one of these is allowed: {known}")
         if name not in HELD:
-            raise unknown_name("hold", name, CONTROLS)
-        return cls(HELD[name], number(f"hold.{name}", value))
+            raise unknown_name("hold", name, dict.fromkeys(HELD.values()))
+        return cls(HELD[name], number(f"hold.{name}", value, above=0.0 if name == GAS else -math.inf), over)
 
     def controlled(self, scene: Scene) -> Controlled:
         """The quantity."""
-        return CONTROLS[self.name]
+        if self.name != GAS:
+            return CONTROLS[self.name]
+        gas = gas_of(scene, "hold")
+        part, _, varies = self.over.partition(".")
+        if part != "chamber":
+            return gas
+        return GasOver(gas.amount, gas.chamber, gas.atmosphere, {"volume": "chamber"}.get(varies, varies))
 
     def control(self, scene: Scene) -> Control:
         """The control that holds it."""
@@ -93,6 +103,19 @@ def family_of(parameter: Parameter) -> Family:
     return Family(parameter.scene, parameter.vary, scene_at=parameter.scene_at)
 
 
+def gas_of(scene: Scene, key: str) -> Gas:
+    """An amount of gas in the chamber of a scene.
+
+    Raises
+    ------
+    InputError
+        When the scene has no chamber.
+    """
+    if scene.chamber is None:
+        raise InputError(key, GAS, "the scene has no chamber of gas; give chamber=fm.Chamber(volume=...), in a scene file [chamber] volume")
+    return Gas(1.0, scene.chamber.volume, scene.chamber.atmosphere)
+
+
 class OverNumber:
     """Of a run over a number: the family answers for all scenes, and a state knows its number as the factor of its evaluation."""
 
@@ -111,6 +134,8 @@ class OverNumber:
 
     def refuse_idle(self, state: State) -> None:
         """Raise InputError for a number that changes no force on the membrane."""
+        if self.parameter.name.startswith("chamber."):  # it acts on the gas
+            return
         family, value = self.family, state.evaluation.factor
         if not np.any(family.number_derivative(state.x, state.pressure, value)):
             raise InputError("over", self.parameter.name, "it changes no force on this membrane, so that nothing would happen")

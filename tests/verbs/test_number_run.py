@@ -99,3 +99,59 @@ def test_what_is_refused() -> None:
         fm.vary(uniform, HEIGHT, [1.0, 2.0], hold={"volume": 0.5})
     with pytest.raises(InputError, match="changes no force"):
         fm.vary(uniform, STRENGTH, [1.0, 2.0], hold={"volume": 0.5})
+
+
+# --- scene files
+
+
+def test_a_scene_file_names_the_number(tmp_path: Path) -> None:
+    by_values = scene(run=fm.Run(control=HEIGHT, hold={"pressure": 0.0}, start=4.0, stop=3.0, steps=3))
+    by_length = scene(run=fm.Run(control="arc-length", over=HEIGHT, hold={"pressure": 0.0}, until={HEIGHT: 3.0}))
+    for asked in (by_values, by_length):
+        asked.to_toml(tmp_path / "scene.toml")
+        assert fm.Scene.from_toml(tmp_path / "scene.toml") == asked
+        branch = fm.run(asked)
+        assert branch.status is Status.CONVERGED
+        assert (branch.over, dict(branch.hold)) == (HEIGHT, {"pressure": 0.0})
+        assert branch.column(HEIGHT)[[0, -1]].tolist() == [4.0, 3.0]
+    assert fm.run(by_values).column(HEIGHT).tolist() == [4.0, 3.5, 3.0]
+    assert fm.Run(control=HEIGHT, hold={"height": 0.2}, values=(4.0,)).hold == {"center_height": 0.2}
+
+
+@pytest.mark.parametrize("control", ["loads", "arc-length"])
+def test_an_interrupted_run_goes_on_to_the_last_bit(control: str, tmp_path: Path) -> None:
+    asked = scene(run=fm.Run(control="arc-length", over=HEIGHT, hold={"pressure": 0.0}, until={HEIGHT: 3.0}))
+    if control == "loads":
+        asked = scene(run=fm.Run(control=HEIGHT, hold={"pressure": 0.0}, start=4.0, stop=2.5, steps=6))
+    kept: list[fm.Branch] = []
+
+    def keep(branch: fm.Branch) -> None:
+        if len(branch) == 4:
+            branch.save(tmp_path / "kept.nc")
+            kept.append(branch)
+
+    whole = fm.run(asked, on_checkpoint=keep)
+    assert len(kept) == 1
+    again = fm.run(asked, unfinished=fm.load(tmp_path / "kept.nc"))
+    for name in (HEIGHT, "volume", "pressure", "elastic_energy"):
+        assert (again.column(name) == whole.column(name)).all()
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        ({"control": HEIGHT, "values": (1.0,)}, r"run\.hold.*missing"),
+        ({"control": HEIGHT, "hold": {HEIGHT: 1.0}, "values": (1.0,)}, "it is the load already"),
+        ({"control": HEIGHT, "hold": {"presure": 1.0}, "values": (1.0,)}, "did you mean 'pressure'"),
+        ({"control": HEIGHT, "hold": {"gas": 1.0}, "values": (1.0,)}, r"chamber\.volume"),
+        ({"control": "source.0.hight", "hold": {"pressure": 0.0}, "values": (1.0,)}, "did you mean 'source.0.height'"),
+        ({"control": "arc-length", "over": "source.1.height", "hold": {"pressure": 0.0}, "until": {"volume": 1.0}}, r"run\.over"),
+        ({"control": "arc-length", "over": "volume", "hold": {"pressure": 0.0}, "until": {"volume": 1.0}}, r"run\.over"),
+        ({"control": "volume", "over": HEIGHT, "values": (1.0,)}, r"run\.over"),
+        ({"control": "volume", "hold": {"pressure": 0.0}, "values": (1.0,)}, r"run\.hold"),
+        ({"control": HEIGHT, "hold": {"pressure": 0.0}, "until": {HEIGHT: 1.0}, "values": (1.0,)}, r"run\.until"),
+    ],
+)
+def test_what_a_scene_file_may_not_ask(run: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        scene(run=fm.Run(**run))  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from ..discretization.space import space_of_scene
 from ..errors import InputError
 from ..kernels.interface import Array, Elements
 from ..physics.magnetics import acting_sources, swept
@@ -70,7 +71,9 @@ class Family(Potential):
         self._members: dict[float, Member] = {}
         number = ca.SX.sym("number")
         with casadi_answers_numpy():
-            super().__init__(vary(number), quadrature)
+            member = vary(number)
+            super().__init__(member, quadrature)
+        self.moves = hasattr(member, "lifted")
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         slot = self.symbols[2][1]
         names = list(self.terms)
@@ -127,13 +130,20 @@ class Family(Potential):
     @BUILDING
     def _number_kernel(self) -> Replay:
         t, (data, local, parameters) = self.terms, self.symbols
-        rows = ca.jacobian(t["gradient"], parameters[1])  # the volume knows no number
+        force = ca.jacobian(t["gradient"] - parameters[0] * t["volume_gradient"], parameters[1])
+        rows = ca.vertcat(force, ca.jacobian(t["volume"], parameters[1]))
         return Replay(ca.Function("number", [data, local, parameters], [ca.densify(rows)], {"cse": True}), self.point_data)
 
     def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
         """Derivative of E' - P V' with respect to the number, shape (n_free,)."""
-        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))
+        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))[:4]
         return self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+
+    def volume_derivative(self, x: Array, number: float) -> float:
+        """Derivative of the volume with respect to the number: zero unless that moves the ends of the membrane."""
+        if not self.moves:
+            return 0.0
+        return float(self._number_kernel(self.space.at_quadrature(x), np.array([0.0, number]))[4].sum())
 
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
@@ -159,7 +169,8 @@ class Member(Potential):
         self.family = family
         self.sources = acting_sources(scene.sources, scene.susceptibility)
         self.loads = tuple(load for load in scene.loads if load.acts)
-        for name in ("space", "sheet", "flat", "symbols", "point_data", "n_points", "bulk", "mass", "area", "rigid"):
+        self.space = space_of_scene(scene) if family.moves else family.space
+        for name in ("sheet", "flat", "symbols", "point_data", "n_points", "bulk", "mass", "area", "rigid"):
             self.__dict__[name] = getattr(family, name)
 
     @cached_property

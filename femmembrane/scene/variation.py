@@ -4,6 +4,7 @@
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
 ``membrane.susceptibility``  chi
+``membrane.prestretch``  p of a flat disc or annulus, or of a tube
 ``chamber.NAME``         volume or atmosphere of the chamber of gas
 ``material.NAME``        a number of a material that has such an argument
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
@@ -25,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..discretization.lift import lift_of
 from ..errors import InputError, unknown_name
 from ..physics.materials import Ogden
 
@@ -68,7 +70,7 @@ class Parameter:
         """The number in the scene given."""
         part, _, rest = self.name.partition(".")
         if part == "membrane":
-            return float(self.scene.susceptibility or 0.0)
+            return float(getattr(self.scene, rest) or 0.0)
         if part == "chamber":
             return float(getattr(self.scene.chamber, rest))
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
@@ -89,7 +91,7 @@ class Parameter:
         """
         part, _, rest = self.name.partition(".")
         if part == "membrane":
-            return self.scene.replace(susceptibility=value)
+            return self.scene.replace(**{rest: value})
         if part == "chamber":
             chamber: Any = self.scene.chamber
             return self.scene.replace(chamber=dataclasses.replace(chamber, **{rest: value}))
@@ -116,8 +118,11 @@ class Parameter:
         sources: tuple[Any, ...] = scene.sources
         loads: tuple[Any, ...] = scene.loads
         susceptibility = scene.susceptibility
+        lifted: dict[str, Any] = {}
         if part == "chamber":  # of the control, and of no potential
             pass
+        elif rest == "prestretch":  # the lift of p is p - 1 times that of 2
+            lifted = {"prestretch": 2.0, "lifted": value - 1}
         elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
         elif rest.startswith("alpha."):
@@ -135,7 +140,7 @@ class Parameter:
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
         kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
-        return SimpleNamespace(**parts, **{name: getattr(scene, name) for name in kept})
+        return SimpleNamespace(**parts, **{**{name: getattr(scene, name) for name in kept}, **lifted})
 
     def _check_modulus(self, value: float, alpha: float) -> None:
         if not 0 < value * alpha < 2:
@@ -164,12 +169,21 @@ def names(scene: Scene) -> list[str]:
     found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
     if scene.sources:
         found.append("membrane.susceptibility")
+    if _can_be_stretched(scene):
+        found.append("membrane.prestretch")
     if getattr(scene, "chamber", None) is not None:
         found += [f"chamber.{name}" for name in _numbers(scene.chamber)]
     material = scene.material
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]
     return found + [f"material.{name}" for name in _numbers(material)]
+
+
+def _can_be_stretched(scene: Scene) -> bool:
+    try:
+        return lift_of(scene.mesh, 2.0) is not None
+    except InputError:
+        return False
 
 
 def _numbers(owner: Any) -> list[str]:

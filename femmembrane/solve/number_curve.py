@@ -28,13 +28,14 @@ from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .branch import AT_CROSSING, FOLDS, BranchProblem
 from .continuation import BranchPoint, CurveProblem, StepControl, Tracer, trace_points
-from .controls import CONTROLS, Control, GasOver, PressureControl, at_number
+from .controls import CONTROLS, Control, PressureControl, at_number
 from .newton import TOLERANCE, relative_residual, relative_size
 from .search import FAR, Limit
 from .segment import Located, Segment
 from .special_points import branch_point
 from .start import moderate
 from .state import Predictor, State
+from .stepping import control_rate
 from .wellposed import ill_posed
 
 #: name of the number among the quantities of a curve, and of a point at which it is stationary among the folds
@@ -299,7 +300,7 @@ def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:
     state = equations.x, equations.pressure, equations.evaluation
     control = at_number(control, equations.number)
     gap, row, corner = control.equation(equations.problem.family.space, *state)
-    rate = control.number_rate(equations.pressure, equations.evaluation.volume) if isinstance(control, GasOver) else 0.0
+    rate = control_rate(equations.problem.family, control, equations.x, equations.pressure, equations.evaluation)
     return gap, np.concatenate([row, [corner, rate]])
 
 

@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import SolveError, Status
-from ..potential import Array, Family, Potential
-from .controls import Control, GasOver
+from ..potential import Array, Evaluation, Family, Potential
+from .controls import Control, Gas, GasOver, VolumeControl
 from .newton import NewtonResult, correct
 from .state import Predictor, State, distance, joined
 from .wellposed import apparent, is_slack, slackness
@@ -99,8 +99,7 @@ def march(
         else:
             step = (there - here) / 2
             # sources at full strength may lie next to a fold, and nobody else looks for a state there: the way to go counts, not the whole
-            ways = {"magnetic": abs(stop - here), "number": abs(stop - start)}
-            way = ways.get(parameter, min(abs(stop - start), abs(here) or np.inf))
+            way = abs(stop - here) if parameter == "magnetic" else min(abs(stop - start), abs(here) or np.inf)
             if abs(step) < max(MIN_STEP * way, ROUND_OFF * abs(stop - start)):
                 message = f"the branch could not be followed beyond {here:.9g} on the way to {stop:.9g}"
                 bad = None if parameter == "magnetic" else apparent(potential, accepted[-1].evaluation)
@@ -118,6 +117,16 @@ def _through_source(potential: Potential, before: State, after: State, parameter
     return parameter == "load" and bool(after.evaluation.factor) and potential.passed_source(before.x, after.x)
 
 
+def control_rate(family: Family, control: Control, x: Array, pressure: float, evaluation: Evaluation) -> float:
+    """Derivative of the equation of a control with respect to the number of a family, at a fixed (x, P)."""
+    rate = control.number_rate(pressure, evaluation.volume) if isinstance(control, GasOver) else 0.0
+    if isinstance(control, VolumeControl):
+        rate += family.volume_derivative(x, evaluation.factor)
+    elif isinstance(control, Gas):
+        rate += (pressure + control.atmosphere) * family.volume_derivative(x, evaluation.factor)
+    return rate
+
+
 def _slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> tuple[Array, float]:
     """Derivative of (x, P) with respect to the parameter."""
     space, evaluation = potential.space, state.evaluation
@@ -126,7 +135,7 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     if parameter == "load":
         return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
     if parameter == "number" and isinstance(potential, Family):
-        rate = control.number_rate(state.pressure, evaluation.volume) if isinstance(control, GasOver) else 0.0
+        rate = control_rate(potential, control, state.x, state.pressure, evaluation)
         return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)
     other = potential.evaluate(state.x, state.pressure, value + 1.0)  # the gradient is linear in the factor: an exact derivative
     return bordered.solve(evaluation.gradient - other.gradient, 0.0)

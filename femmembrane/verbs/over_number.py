@@ -134,7 +134,8 @@ class OverNumber:
 
     def refuse_idle(self, state: State) -> None:
         """Raise InputError for a number that changes no force on the membrane."""
-        if self.parameter.name.startswith("chamber."):  # it acts on the gas
+        # a chamber acts on the gas, and a flat sheet that is stretched stays flat
+        if self.parameter.name.startswith("chamber.") or self.family.moves:
             return
         family, value = self.family, state.evaluation.factor
         if not np.any(family.number_derivative(state.x, state.pressure, value)):

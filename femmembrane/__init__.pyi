@@ -20,6 +20,7 @@ from .errors import FemmembraneError as FemmembraneError
 from .errors import InputError as InputError
 from .errors import SolveError as SolveError
 from .errors import Status as Status
+from .physics.chamber import Chamber as Chamber
 from .physics.hooke import Hooke as Hooke
 from .physics.invariant import ArrudaBoyce as ArrudaBoyce
 from .physics.invariant import ExtendedTube as ExtendedTube
@@ -86,6 +87,7 @@ from .verbs import inflate as inflate
 from .verbs import pressurize as pressurize
 from .verbs import run as run
 from .verbs import trace_iter as trace_iter
+from .verbs import vary as vary
 from .verbs.convergence import convergence as convergence
 from .verbs.cost import cost as cost
 from .verbs.sweep import plan_sweep as plan_sweep

@@ -63,7 +63,10 @@ def _way(scene: Scene, equilibrium: Equilibrium) -> str:
     from ..quantities import words
 
     until = scene.run.until if scene.run is not None and scene.run.until else {}
-    return ", ".join(f"{words(name)} {getattr(equilibrium, name):.4g} until {end:.4g}" for name, end in until.items())
+    return ", ".join(
+        f"{words(name)} {equilibrium.number(name) if '.' in name else getattr(equilibrium, name):.4g} until {end:.4g}"
+        for name, end in until.items()
+    )
 
 
 def _line(equilibrium: Equilibrium) -> str:

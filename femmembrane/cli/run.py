@@ -140,10 +140,12 @@ def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Stat
     """The branch of the equilibria found before the computation ended early. Special points are not searched for."""
     from ..results.branch import Branch
 
-    used = equilibria[0].scene if equilibria else scene  # its mesh may have been chosen on the way
+    # its mesh may have been chosen on the way
+    used = scene.replace(mesh=equilibria[0].scene.mesh, degree=equilibria[0].scene.degree) if equilibria else scene
     asked = used.run
-    solver = asked.solver if asked is not None and asked.control in ("volume", "pressure") else "newton"
-    return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver)
+    over, hold = (asked.number or "", dict(asked.hold or {})) if asked is not None else ("", {})
+    solver = asked.solver if asked is not None and asked.minimised else "newton"
+    return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver, over=over, hold=hold)
 
 
 def _write(branch: Branch, out: Path, scene: Path, changes: Sequence[str], units: str) -> list[Path]:

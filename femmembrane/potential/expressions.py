@@ -65,7 +65,8 @@ def point_expressions(
     flat = "Z" not in columns
     R, R_x, weight, Z, Z_x = (data[columns.index(c)] if c in columns else ca.SX(0) for c in ("R", "R_x", "weight", "Z", "Z_x"))
     own_w, own_w_x = local[2], local[3]
-    u, u_x, w, w_x = (local[k] + data[columns.index(name)] if name in columns else local[k] for k, name in enumerate(LIFT))
+    share = getattr(scene, "lifted", 1.0)  # of the lift, where that is the number of a family
+    u, u_x, w, w_x = (local[k] + share * data[columns.index(name)] if name in columns else local[k] for k, name in enumerate(LIFT))
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
     if "thickness" in columns:

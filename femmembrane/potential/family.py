@@ -9,15 +9,24 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from ..kernels.interface import Array
-from ..physics.magnetisation import Magnetisation
+from ..discretization.space import space_of_scene
+from ..errors import InputError
+from ..kernels.interface import Array, Elements
+from ..physics.magnetics import swept
+from ..physics.magnetisation import Magnetisation, sources_that_act
 from ..threads import cached_property
 from .expressions import BUILDING, casadi_answers_numpy
-from .potential import Potential, require_elements
+from .potential import Evaluation, Potential, potential_of, require_elements
 from .replay import Replay
 
 if TYPE_CHECKING:
     from ..scene import Scene
+
+
+#: members that a family keeps: neighbours on a curve ask for the same ones
+_KEPT = 8
+#: distance of two values, relative to the larger one, at which they are not told apart any more
+ROUND_OFF = 1e-15
 
 
 @dataclass(slots=True)
@@ -45,20 +54,68 @@ class Family(Potential):
         Any member of the family.
     vary : callable
         The parts of the member at a value of the number, a CasADi symbol here: an object with the attributes of a scene.
+    scene_at : callable, optional
+        The member itself, a checked scene, for whoever asks for the potential of one.
     """
 
     @BUILDING
-    def __init__(self, scene: Scene, vary: Callable[[Any], Any], quadrature: int | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        vary: Callable[[Any], Any],
+        quadrature: int | None = None,
+        *,
+        scene_at: Callable[[float], Scene] | None = None,
+    ) -> None:
         require_elements(scene)
+        self._scene_at = scene_at or (lambda number: scene)
+        self._members: dict[float, Member] = {}
         number = ca.SX.sym("number")
         with casadi_answers_numpy():
-            super().__init__(vary(number), quadrature)
+            member = vary(number)
+            super().__init__(member, quadrature)
+        self.moves = hasattr(member, "lifted")
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         self.magnetisation = Magnetisation.of(scene) if scene.sources else None
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
         self.terms = {name: ca.substitute(self.terms[name], old, new) for name in names}
+
+    def member(self, number: float) -> Member:
+        """The potential of the scene that has a value of the number. Nothing is built for it; the last ones are kept.
+
+        Raises
+        ------
+        InputError
+            For a value that the scene cannot take.
+        """
+        known = self._members.pop(number, None)
+        if known is None:
+            known = Member(self, self._scene_at(number), number)
+        self._members[number] = known
+        if len(self._members) > _KEPT:
+            self._members.pop(next(iter(self._members)), None)
+        return known
+
+    def takes(self, number: float) -> bool:
+        """Whether there is a scene with a value of the number."""
+        try:
+            self.member(number)
+        except InputError:
+            return False
+        return True
+
+    def last_value(self, before: float, beyond: float) -> float:
+        """The last value that the scene can take on the way from one that it can to one that it cannot take."""
+        if before * beyond < 0 and not self.takes(-ROUND_OFF * before) and self.takes(0.0):
+            return 0.0
+        while abs(beyond - before) > ROUND_OFF * max(abs(before), abs(beyond)):
+            middle = (before + beyond) / 2
+            if middle in (before, beyond):
+                break
+            before, beyond = (middle, beyond) if self.takes(middle) else (before, middle)
+        return before
 
     @cached_property
     @BUILDING
@@ -75,13 +132,20 @@ class Family(Potential):
     @BUILDING
     def _number_kernel(self) -> Replay:
         t, (data, local, parameters) = self.terms, self.symbols
-        rows = ca.jacobian(t["gradient"], parameters[1])  # the volume knows no number
+        force = ca.jacobian(t["gradient"] - parameters[0] * t["volume_gradient"], parameters[1])
+        rows = ca.vertcat(force, ca.jacobian(t["volume"], parameters[1]))
         return Replay(ca.Function("number", [data, local, parameters], [ca.densify(rows)], {"cse": True}), self.point_data)
 
     def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
         """Derivative of E' - P V' with respect to the number, shape (n_free,)."""
-        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))
+        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))[:4]
         return self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+
+    def volume_derivative(self, x: Array, number: float) -> float:
+        """Derivative of the volume with respect to the number: zero unless that moves the ends of the membrane."""
+        if not self.moves:
+            return 0.0
+        return float(self._number_kernel(self.space.at_quadrature(x), np.array([0.0, number]))[4].sum())
 
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
@@ -90,3 +154,62 @@ class Family(Potential):
         out = self._fold_kernel(local, np.array([pressure, number, q]))
         cubic, force = (space.assemble_vector(rows.reshape(-1, ne)) for rows in (out[:4], out[6:]))
         return FoldDerivatives(cubic, float(out[4].sum()), float(out[5].sum()), force)
+
+
+class Member(Potential):
+    """The potential of one scene of a family: the functions of the family, called with the number that this scene has.
+
+    Parameters
+    ----------
+    family : Family
+    scene : Scene
+    number : float
+    """
+
+    def __init__(self, family: Family, scene: Scene, number: float) -> None:
+        self.scene, self.number = scene, number
+        self.family = family
+        self.sources = sources_that_act(scene)
+        self.loads = tuple(load for load in scene.loads if load.acts)
+        self.space = space_of_scene(scene) if family.moves else family.space
+        self.magnetisation = Magnetisation.of(scene) if self.sources else None
+        for name in ("sheet", "level", "symbols", "point_data", "n_points", "bulk", "mass", "area", "rigid"):
+            self.__dict__[name] = getattr(family, name)
+        self.strained = self.space.strained or self.prestressed
+        self.flat = self.level and not self.strained
+
+    @cached_property
+    @BUILDING
+    def terms(self) -> dict[str, ca.SX]:  # type: ignore[override]
+        """Those of the family at the number."""
+        slot = self.symbols[2][1]
+        return {name: ca.substitute(term, slot, self.number) for name, term in self.family.terms.items()}
+
+    @property
+    def elements(self) -> Elements:
+        return self.family.elements
+
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+        """As :meth:`.Potential.evaluate`; with weaker sources it is the scene's own potential that answers."""
+        if magnetic != 1.0:
+            return potential_of(self.scene).evaluate(x, pressure, magnetic)
+        elements = self.elements
+        return Evaluation(x, *elements.evaluate(np.ascontiguousarray(x, dtype=float), pressure, self.number), self, elements, magnetic)
+
+    def came_through_source(self, x: Array, before: Member, x_before: Array) -> bool:
+        """Whether the membrane went through a source on the way from a state of another member, where that source stood elsewhere.
+
+        What counts is the way relative to the source.
+        """
+        if not self.sources or len(self.sources) != len(before.sources):
+            return False
+        meridians = before._meridian(x_before), self._meridian(x)
+        heights = list(zip(self.space.axis_heights(x_before), self.space.axis_heights(x), strict=True))
+        for source, old in zip(self.sources, before.sources, strict=True):
+            rise = getattr(source, "height", 0.0) - getattr(old, "height", 0.0)
+            if any(source.passed(start + rise, end) for start, end in heights):
+                return True
+            for circle, place in zip(source.circles, old.circles, strict=True):
+                if swept(meridians[0] + (np.array(circle) - np.array(place))[:, None], meridians[1], circle):
+                    return True
+        return False

@@ -67,6 +67,11 @@ class Branch(Sequence[Equilibrium]):
         Which solver found the equilibria: ``ipopt`` or ``newton``; empty where that was not noted.
     remarks : tuple of str
         Remarks on how the run went on, for instance that another processor began it.
+    over : str
+        The number of the scene that changes along the branch, by its name, such as ``source.0.height``; empty where none does. Every
+        equilibrium has the scene with its own value, and the name is one of the columns.
+    hold : mapping of str to float
+        What is held meanwhile, and at which value.
 
     Examples
     --------
@@ -88,6 +93,8 @@ class Branch(Sequence[Equilibrium]):
     jumps: tuple[Jump, ...] = ()
     solver: str = ""
     remarks: tuple[str, ...] = ()
+    over: str = ""
+    hold: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -112,10 +119,10 @@ class Branch(Sequence[Equilibrium]):
         Parameters
         ----------
         name : str
-            ``step``, ``status``, any column of the table or an energy. ``lambda_`` or ``verdict_`` is followed by pressure, volume, n1, n2,
-            ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for error estimates (relative errors at
-            the load that its [run] prescribes, else at the volume). A scene with scales has ``pressure_pa``, ``volume_m3``,
-            ``center_height_m``, ``elastic_energy_j``, ... as well.
+            ``step``, ``status``, any column of the table, an energy, or a number of the scene by its name. ``lambda_`` or ``verdict_`` is
+            followed by pressure, volume, n1, n2, ...; ``fraction_`` by a kind of zones; ``error_`` by a quantity, where the scene asks for
+            error estimates (relative errors at the load that its [run] prescribes, else at the volume). A scene with scales has
+            ``pressure_pa``, ``volume_m3``, ``center_height_m``, ``elastic_energy_j``, ... as well.
 
         Raises
         ------
@@ -128,11 +135,13 @@ class Branch(Sequence[Equilibrium]):
 
     def __str__(self) -> str:
         columns = printed(self.scene)
-        head = " ".join([f"{'step':>4}", *(f"{words(name):>12}" for name in PLACES)])
+        own, width = [self.over] if self.over else [], max(len(self.over), 12)
+        head = " ".join([f"{'step':>4}", *(f"{name:>{width}}" for name in own), *(f"{words(name):>12}" for name in PLACES)])
         head += "".join(f"  {c.heading:<{c.width}}" for c in columns)
         lines = [printable(self.scene.title), head] if self.scene.title else [head]
         for k, eq in enumerate(self):
-            numbers = " ".join([f"{k:>4}", *(written(name, getattr(eq, name), 12) for name in PLACES)])
+            varied = (f"{eq.number(name):>{width}.6g}" for name in own)
+            numbers = " ".join([f"{k:>4}", *varied, *(written(name, getattr(eq, name), 12) for name in PLACES)])
             lines.append(numbers + "".join(f"  {c.text(eq):<{c.width}}" for c in columns))
         lines += [line for line in (self.mesh_used, *self.notes, self.message) if line]
         return "\n".join(line.rstrip() for line in lines)
@@ -195,7 +204,7 @@ class Branch(Sequence[Equilibrium]):
         door.write_vtk(self, path)
 
     def plot(self, path: str | PathLike[str] | None = None, *, units: str = "scaled") -> Any:
-        """Pressure against volume as a Matplotlib figure.
+        """Pressure against volume as a Matplotlib figure; over a number what answers to it, at what is held.
 
         Parameters
         ----------

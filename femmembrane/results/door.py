@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
+    from ..solve.controls import Gas
     from ..stability.profile import Profile
     from .branch import Branch
     from .convergence import Convergence
@@ -27,6 +28,13 @@ if TYPE_CHECKING:
 
 
 # --- questions
+
+
+def gas(amount: float, chamber: float, atmosphere: float) -> Gas:
+    """See :class:`femmembrane.Gas`."""
+    from ..solve.controls import Gas
+
+    return Gas(amount, chamber, atmosphere)
 
 
 def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:

@@ -13,6 +13,7 @@ from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
 from ..scene import WRINKLING
+from ..scene.variation import Parameter
 from ..solve.controls import control_kind
 from ..threads import one_thread
 from . import door
@@ -102,6 +103,29 @@ class Equilibrium:
 
         return potential_of(self.scene)
 
+    def number(self, name: str) -> float:
+        """A number of its scene.
+
+        Parameters
+        ----------
+        name : str
+            As :mod:`femmembrane.scene.variation` has it: ``source.0.height``.
+
+        Raises
+        ------
+        InputError
+            For a name that the scene does not have.
+        """
+        return Parameter(self.scene, name).value
+
+    @property
+    def gas_amount(self) -> float:
+        """The amount of gas that holds it, in units of mu T R0^2: with the chamber of its scene; NaN without a chamber."""
+        chamber = self.scene.chamber
+        if chamber is None:
+            return float("nan") if self.gas is None else self.gas.amount
+        return chamber.amount(self.pressure, self.volume)
+
     def in_scene(self, scene: Scene) -> Equilibrium:
         """The same equilibrium in a scene with the same potential, which may have other scales and other analyses.
 
@@ -172,7 +196,8 @@ class Equilibrium:
         azimuthal : int
             Number of waves around the axis; 0 for axisymmetric perturbations.
         gas : Gas, optional
-            For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found.
+            For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found, or the amount in the chamber of
+            the scene that holds it.
 
         Raises
         ------
@@ -187,9 +212,20 @@ class Equilibrium:
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
-        gas = gas or self.gas if control == "gas" else None
         key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
+        if control == "gas" and gas is None:
+            gas = self.enclosed
         return self.remembered(key, lambda: self._judged(control, azimuthal, gas))
+
+    @property
+    def enclosed(self) -> Gas | None:
+        """The gas under which it was found, or that in the chamber of its scene which holds it; None without a chamber, or where no amount
+        of gas holds it."""
+        chamber = self.scene.chamber
+        if self.gas is not None or chamber is None:
+            return self.gas
+        amount = chamber.amount(self.pressure, self.volume)
+        return door.gas(amount, chamber.volume, chamber.atmosphere) if amount > 0 and self.volume > -chamber.volume else None
 
     @one_thread
     def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:

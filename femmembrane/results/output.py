@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 #: the record of a run, which makes its folder complete
 RECORD = "run.json"
+#: the diagram of a run, and of one over a number of the scene
+DIAGRAMS = ("pressure-volume.png", "response.png")
 #: the folder of the surfaces of a run
 SURFACES_FOLDER = "membrane"
 
@@ -38,7 +40,7 @@ def run_files() -> tuple[str, ...]:
     """All files that a run may leave behind, in the order in which they are listed."""
     tables, pictures = ([name for a in registered() for name in getattr(a, kind)] for kind in ("tables", "pictures"))
     last = "report.html"  # written from the rest, by whom it is asked for
-    return ("branch.csv", "special_points.csv", *tables, RECORD, "branch.nc", "pressure-volume.png", *pictures, SURFACES, last)
+    return ("branch.csv", "special_points.csv", *tables, RECORD, "branch.nc", *DIAGRAMS, *pictures, SURFACES, last)
 
 
 def write_run(
@@ -47,7 +49,8 @@ def write_run(
     """Write everything that is known of a branch to a folder.
 
     ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), the files of the analyses that the scene
-    asks for (of wrinkling ``zones.csv`` and ``zones.png``), ``pressure-volume.png``, ``membrane.pvd`` with one VTU file an equilibrium in
+    asks for (of wrinkling ``zones.csv`` and ``zones.png``), ``pressure-volume.png`` (over a number
+    ``response.png``), ``membrane.pvd`` with one VTU file an equilibrium in
     ``membrane/`` and, last, ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without
     equilibria leaves ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write are
     removed, so that the folder speaks of one run only.
@@ -187,7 +190,8 @@ def _writers(branch: Branch, command: str | Sequence[str] | None, units: str) ->
     analyses = asked(branch.scene)
     writers |= {name: partial(write, branch) for analysis in analyses for name, write in analysis.tables.items()}
     if len(branch):
-        writers |= {"branch.nc": partial(save, branch), "pressure-volume.png": partial(door.plot_pressure_volume, branch, units=units)}
+        diagram = DIAGRAMS[bool(branch.over)]
+        writers |= {"branch.nc": partial(save, branch), diagram: partial(door.plot_pressure_volume, branch, units=units)}
         writers[SURFACES] = partial(door.write_vtk, branch)
         writers |= {name: partial(draw, branch) for analysis in analyses for name, draw in analysis.pictures.items()}
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)

@@ -19,7 +19,7 @@ class PathMemory:
     sigma : tuple of float
         Load (in a trace: arc length) at the last points that predict the next one, two at most.
     points, slopes : ndarray, shape (len(sigma), n_free + 1)
-        (x, P) and its derivative with respect to sigma there.
+        (x, P) and its derivative with respect to sigma there; of a trace over a number the number as well.
     """
 
     sigma: tuple[float, ...]
@@ -41,9 +41,12 @@ class TraceMemory(PathMemory):
         Changes of inertia met so far at which no special point was located.
     known : float
         Relative size of the last correction of the point from which the next step sets out.
+    border : ndarray, shape (n_free,), or None
+        Over a number: the softest displacement at that point, by which its equations are solved.
     """
 
     step: float
     regular: int
     unexplained: tuple[str, ...] = ()
     known: float = 0.0
+    border: Array | None = None

@@ -19,7 +19,8 @@ class SpecialPoint:
     Attributes
     ----------
     kind : str
-        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset.
+        limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset; over a number of the scene number_fold,
+        where that is stationary.
     volume, pressure, center_height : float
         Of its equilibrium.
     error : float
@@ -28,7 +29,8 @@ class SpecialPoint:
     azimuthal : int
         For an azimuthal onset: the number of waves against which stability is lost or regained there.
     tangent : ndarray, shape (n_free + 1,), or None
-        For a branch point: the direction in (x, P) of the branch on which it was found. It tells this branch from the crossing one.
+        For a branch point of one scene: the direction in (x, P) of the branch on which it was found. It tells this branch from the
+        crossing one.
     """
 
     kind: str

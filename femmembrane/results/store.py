@@ -58,8 +58,8 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
     for analysis in asked(branch.scene):
         variables |= analysis.variables(branch)
     if branch.special_points is not None:
-        variables |= special_variables(branch.special_points, width, SPECIAL)
-    variables |= jump_variables(branch.jumps, width)
+        variables |= special_variables(branch.special_points, width, SPECIAL, branch.over)
+    variables |= jump_variables(branch.jumps, width, branch.over)
     variables |= memory_variables(branch.memory)
     described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
     coordinates = {name: described.pop(name) for name in [*described] if name in ("r", "s") or described[name][0] == (name,)}
@@ -173,6 +173,7 @@ def _attributes(branch: Branch) -> dict[str, Any]:
         "message": branch.message,
         **({"solver": branch.solver} if branch.solver else {}),
         **({"remarks": json.dumps(branch.remarks)} if branch.remarks else {}),
+        **({"over": branch.over, "hold": json.dumps(dict(branch.hold))} if branch.over else {}),
         "timings": json.dumps(branch.timings),
         "scene": scene_text(branch.scene),
         **memory_attributes(branch.memory),
@@ -197,19 +198,22 @@ def read_branch_file(path: str | PathLike[str]) -> xarray.Dataset:
 
 
 def _branch(dataset: xarray.Dataset, scene: Scene) -> Branch:
-    equilibria = tuple(equilibria_of(dataset, scene))
+    over = str(dataset.attrs.get("over", ""))
+    equilibria = tuple(equilibria_of(dataset, scene, over))
     branch = Branch(
         scene=scene,
         equilibria=equilibria,
-        special_points=special_points_of(dataset, scene, SPECIAL),
+        special_points=special_points_of(dataset, scene, over, SPECIAL),
         status=Status(dataset.attrs["status"]),
         message=str(dataset.attrs["message"]),
         timings={str(stage): float(seconds) for stage, seconds in json.loads(dataset.attrs["timings"]).items()},
         memory=memory_of(dataset),
-        jumps=jumps_of(dataset, scene, equilibria),
+        jumps=jumps_of(dataset, scene, over, equilibria),
         # younger than the format
         solver=str(dataset.attrs.get("solver", "")),
         remarks=tuple(map(str, json.loads(dataset.attrs.get("remarks", "[]")))),
+        over=over,
+        hold={str(name): float(value) for name, value in json.loads(dataset.attrs.get("hold", "{}")).items()},
     )
     for analysis in asked(scene):
         analysis.restore(dataset, branch)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import Status
 from ..quantities import typed
+from ..scene.variation import Parameter
 from .analyses.base import Variable
 from .equilibrium import Equilibrium
 from .path_memory import PathMemory, TraceMemory
@@ -49,8 +50,8 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
     }
 
 
-def equilibria_of(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> list[Equilibrium]:
-    """The equilibria of a scene; ``prefix`` is that of their variables."""
+def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str = "") -> list[Equilibrium]:
+    """The equilibria of a scene, or of scenes that differ in the number ``over``; ``prefix`` is that of their variables."""
     count = len(dataset[prefix + "status"])
     states = _finite(dataset, prefix + "state", count, _unknowns(scene) if count else dataset.sizes["coefficient"])
     states.flags.writeable = False
@@ -58,20 +59,23 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, prefix: str = "") -> li
     needed = [name for name in _SCALARS if (count and present.get(name, True)) or prefix + name in dataset]
     scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
     scalars.setdefault("magnetic_energy", [0.0] * count)
+    scenes = [scene] * count
+    if over:
+        scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},
             iterations=int(dataset[prefix + "iterations"].values[k]),
             status=Status(str(dataset[prefix + "status"].values[k])),
-            scene=scene,
+            scene=scenes[k],
             state=states[k],
         )
         for k in range(count)
     ]
 
 
-def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -> dict[str, Variable]:
-    """What :func:`special_points_of` needs to build the records again, their equilibria included."""
+def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str, over: str) -> dict[str, Variable]:
+    """What :func:`special_points_of` needs to build the records again, their equilibria included, over a number or none."""
     dimension = prefix + "point"
     numbers = {prefix + name: ((dimension,), typed(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
     kinds: dict[str, Variable] = {prefix + "kind": ((dimension,), typed("kind", (str(p.kind) for p in points)))}
@@ -80,16 +84,19 @@ def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str) -
         none = np.full(width + 1, np.nan)
         tangents[prefix + "tangent"] = (dimension, "unknown"), np.array([none if p.tangent is None else p.tangent for p in points])
     states = equilibrium_variables([p.equilibrium for p in points], width, dimension, prefix + "equilibrium_")
-    return {**kinds, **numbers, **tangents, **states}
+    own: dict[str, Variable] = {}
+    if over:
+        own[f"{prefix}equilibrium_{over}"] = (dimension,), typed(over, (p.equilibrium.number(over) for p in points))
+    return {**kinds, **own, **numbers, **tangents, **states}
 
 
-def special_points_of(dataset: xarray.Dataset, scene: Scene, prefix: str) -> tuple[SpecialPoint, ...] | None:
+def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str) -> tuple[SpecialPoint, ...] | None:
     """The special points, None where none were looked for."""
     if prefix + "kind" not in dataset:
         return None
     kinds = [str(k) for k in dataset[prefix + "kind"].values]
     numbers = zip(*(dataset[prefix + name].values.tolist() for name in _SPECIAL_NUMBERS), strict=True)
-    states = equilibria_of(dataset, scene, prefix + "equilibrium_")
+    states = equilibria_of(dataset, scene, over, prefix + "equilibrium_")
     # younger than the format, and only where there are branch points
     tangents: list[Array | None] = [None] * len(kinds)
     if prefix + "tangent" in dataset:
@@ -105,7 +112,9 @@ def memory_variables(memory: PathMemory | None) -> dict[str, Variable]:
     """The path that predicts the next equilibrium."""
     if memory is None:
         return {}
+    border = memory.border if isinstance(memory, TraceMemory) else None
     return {
+        **({} if border is None else {"trace_border": (("coefficient",), border)}),
         "trace_sigma": (("trace",), np.array(memory.sigma)),
         "trace_point": (("trace", "unknown"), memory.points),
         "trace_slope": (("trace", "unknown"), memory.slopes),
@@ -117,7 +126,7 @@ def memory_of(dataset: xarray.Dataset) -> PathMemory | None:
     if "trace_sigma" not in dataset:
         return None
     sigma = _finite(dataset, "trace_sigma", dataset.sizes["trace"])
-    shape = len(sigma), dataset.sizes["coefficient"] + 1
+    shape = len(sigma), dataset.sizes["coefficient"] + (2 if "trace_border" in dataset else 1)
     points, slopes = (_finite(dataset, name, *shape) for name in ("trace_point", "trace_slope"))
     if "trace_step" not in dataset.attrs:
         return PathMemory(tuple(sigma.tolist()), points, slopes)
@@ -126,7 +135,8 @@ def memory_of(dataset: xarray.Dataset) -> PathMemory | None:
     if not (len(sigma) and 0 < step < np.inf and 1 <= regular <= dataset.sizes["step"]):
         raise ValueError("the memory of the trace does not belong to it")
     known = float(dataset.attrs.get("trace_known", 0.0))
-    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained, known)
+    border = _finite(dataset, "trace_border", dataset.sizes["coefficient"]) if "trace_border" in dataset else None
+    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained, known, border)
 
 
 def memory_attributes(memory: PathMemory | None) -> dict[str, Any]:
@@ -137,7 +147,7 @@ def memory_attributes(memory: PathMemory | None) -> dict[str, Any]:
     return {"trace_step": memory.step, "trace_regular": memory.regular, "trace_known": memory.known, **unexplained}
 
 
-def jump_variables(jumps: Sequence[Jump], width: int) -> dict[str, Variable]:
+def jump_variables(jumps: Sequence[Jump], width: int, over: str) -> dict[str, Variable]:
     """Where a run snapped, and the folds before."""
     if not jumps:
         return {}
@@ -145,15 +155,15 @@ def jump_variables(jumps: Sequence[Jump], width: int) -> dict[str, Variable]:
     return {
         "jump_index": (("jump",), typed("jump_index", (jump.index for jump in jumps))),
         "jump_limit": (("jump",), typed("jump_limit", (jump.limit is not None for jump in jumps))),
-        **special_variables(limits, width, LIMIT),
+        **special_variables(limits, width, LIMIT, over),
     }
 
 
-def jumps_of(dataset: xarray.Dataset, scene: Scene, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:
+def jumps_of(dataset: xarray.Dataset, scene: Scene, over: str, equilibria: tuple[Equilibrium, ...]) -> tuple[Jump, ...]:
     """Where a run snapped."""
     if "jump_index" not in dataset:
         return ()
-    limits = iter(special_points_of(dataset, scene, LIMIT) or ())
+    limits = iter(special_points_of(dataset, scene, over, LIMIT) or ())
     located = list(zip(dataset["jump_index"].values.tolist(), dataset["jump_limit"].values.tolist(), strict=True))
     if not all(0 <= index < len(equilibria) for index, _ in located):
         raise ValueError("a snap lands on no equilibrium")

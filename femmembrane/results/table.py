@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .. import files
 from ..errors import unknown_name
+from ..scene.variation import names
 from .analyses import ANALYSES, asked, typed_column
 from .analyses.base import Cell, EquilibriumAnalysis
 
@@ -31,14 +32,18 @@ _LAST = ("residual", "iterations", "seconds")
 def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
-    Between those that every branch has stand ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, and the
-    columns of the analyses that the scene asks for.
+    Behind the step stands the number of the scene that changes along the branch, if one does. Between those that every branch has stand
+    ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, and the columns of the analyses that the scene asks
+    for.
     """
     scene = branch.scene
     return [
-        *("step", "volume", "pressure", "center_height", "elastic_energy"),
+        "step",
+        *([branch.over] if branch.over else []),
+        *("volume", "pressure", "center_height", "elastic_energy"),
         *(["magnetic_energy"] if scene.sources else []),
         *(["load_energy"] if scene.loads else []),
+        *(["gas"] if scene.chamber else []),
         *(name for analysis in asked(scene) for name in analysis.columns(scene)),
         *_LAST,
     ]
@@ -55,6 +60,10 @@ def reader(scene: Scene, column: str) -> Callable[[int, Equilibrium], Cell]:
     if own:
         value = own[0].value
         return lambda step, equilibrium: value(equilibrium, column)
+    if column == "gas":
+        return lambda step, equilibrium: equilibrium.gas_amount
+    if "." in column:
+        return lambda step, equilibrium: equilibrium.number(column)
     kind = int if column == "iterations" else float
     return lambda step, equilibrium: kind(getattr(equilibrium, column))
 
@@ -65,7 +74,7 @@ def known_columns(branch: Branch) -> list[str]:
     Verdicts against azimuthal perturbations of any number of waves are left out of the list.
     """
     more = (name for analysis in ANALYSES for name in analysis.more_columns())
-    return list(dict.fromkeys([*columns(branch), "magnetic_energy", "load_energy", "status", *more]))
+    return list(dict.fromkeys([*columns(branch), *names(branch.scene), "magnetic_energy", "load_energy", "status", *more]))
 
 
 def column(branch: Branch, name: str) -> NDArray[Any]:
@@ -97,15 +106,20 @@ def write_csv(branch: Branch, path: str | PathLike[str]) -> None:
 def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
     """One row for each special point of the branch, in the order of :func:`special_point_columns`."""
     values = [
-        *(partial(_attribute, name=name) for name in SPECIAL_POINT_COLUMNS),
+        *(partial(_attribute, name=name) for name in _located_by(branch)),
         *(partial(analysis.point_value, column=name) for analysis, name in _of_points(branch.scene)),
     ]
     for point in branch.special_points or ():
         yield [value(point) for value in values]
 
 
+def _located_by(branch: Branch) -> list[str]:
+    kind, *places = SPECIAL_POINT_COLUMNS
+    return [kind, *([branch.over] if branch.over else []), *places]
+
+
 def _attribute(point: SpecialPoint, name: str) -> Any:
-    return getattr(point, name)
+    return point.equilibrium.number(name) if "." in name else getattr(point, name)
 
 
 def _of_points(scene: Scene) -> list[tuple[EquilibriumAnalysis, str]]:
@@ -113,8 +127,9 @@ def _of_points(scene: Scene) -> list[tuple[EquilibriumAnalysis, str]]:
 
 
 def special_point_columns(branch: Branch) -> list[str]:
-    """Columns of ``special_points.csv``: kind, volume, pressure, center_height, error, and those of the analyses of the scene."""
-    return [*SPECIAL_POINT_COLUMNS, *(name for _, name in _of_points(branch.scene))]
+    """Columns of ``special_points.csv``: kind, a number that changes along the branch, volume, pressure, center_height, error, and those of
+    the analyses of the scene."""
+    return [*_located_by(branch), *(name for _, name in _of_points(branch.scene))]
 
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:

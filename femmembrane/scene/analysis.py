@@ -9,7 +9,7 @@ from typing import Any
 from ..checks import choice, sequence, store, switch, whole
 from ..errors import InputError
 
-VERDICTS = ("pressure", "volume")
+VERDICTS = ("pressure", "volume", "gas")
 WRINKLING = ("total", "mechanical")
 #: largest number of waves around the axis, a thousand times more than a mesh resolves
 MAX_WAVES = 10**6
@@ -62,8 +62,8 @@ class Analysis:
 
     Parameters
     ----------
-    stability : sequence of {"pressure", "volume"}
-        Controls under which the verdict on axisymmetric perturbations is given.
+    stability : sequence of {"pressure", "volume", "gas"}
+        Controls under which the verdict on axisymmetric perturbations is given; with gas its amount in the chamber of the scene is held.
     azimuthal_modes : sequence of int
         Circumferential wave numbers n >= 1 for which the verdict is given.
     wrinkling : {"total", "mechanical"}, optional
@@ -86,7 +86,7 @@ class Analysis:
     extra: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        stability = sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure" and "volume"')
+        stability = sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure", "volume" and "gas"')
         modes = sequence("analysis.azimuthal_modes", self.azimuthal_modes, "a list of whole numbers >= 1 is allowed")
         extra = sequence("analysis.extra", self.extra, _NAMES)
         for k, name in enumerate(stability):

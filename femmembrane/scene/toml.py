@@ -15,6 +15,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [run]                        Run
     [analysis]                   Analysis
     [scales]                     Scales
+    [chamber]                    Chamber
 
 A new model, source, load or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
 Values are checked where the objects are made, so that files and Python code meet the same errors, named by their key in a file.
@@ -40,6 +41,7 @@ from ..discretization.mesh_files import read_meridian
 from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
+from ..physics.chamber import Chamber
 from ..physics.hooke import Hooke
 from ..physics.invariant import ArrudaBoyce, ExtendedTube, Fung, Gent, LopezPamies, Yeoh
 from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
@@ -185,6 +187,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         analysis=_build("analysis", Analysis, tables["analysis"]),
         title=data.get("title", ""),
         scales=scales,
+        chamber=_build("chamber", Chamber, tables["chamber"]) if "chamber" in data else None,
         **arguments,
     )
 
@@ -207,6 +210,7 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         "run": _arguments(scene.run) if scene.run else {},
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
         "scales": _arguments(scene.scales) if scene.scales else {},
+        "chamber": _arguments(scene.chamber) if scene.chamber else {},
     }
     for name in ("thickness", "modulus", "remanence"):
         if callable(getattr(getattr(scene, name), "given", None)):
@@ -220,8 +224,6 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         del tables["membrane"]["radius_to_thickness"]
     if scene.run and scene.run.control != "arc-length":
         del tables["run"]["max_steps"]
-    if scene.run and scene.run.direction == 1:
-        del tables["run"]["direction"]
     plain: dict[str, Any] = _plain(tables)
     return {name: table for name, table in plain.items() if table not in ("", {}, [])}
 
@@ -237,7 +239,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["source"] = {"kind", "remanence"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
     keys["mesh"] |= {"shape", "file", "unit", *FILE_KEYS} | arguments(*SHAPES.values())
-    return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales)}
+    return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales), "chamber": arguments(Chamber)}
 
 
 def _refuse_unknown(path: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:

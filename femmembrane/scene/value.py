@@ -20,14 +20,16 @@ from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
 from ..physics.along import Along
+from ..physics.chamber import Chamber
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source
 from ..physics.materials import Material
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
 from .magnetisation import checked_magnetisation, refuse_magnetisation
-from .run import Run
+from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
+from .variation import names
 
 MAX_DEGREE = 8
 #: largest pre-stretch: its sixth power is still a number beside 1
@@ -89,6 +91,8 @@ class Scene:
         Required with a remanence.
     remanence_transport : {"deformed", "rotated"}, optional
         Whether it is carried by the deformation gradient (left out) or by the rotation alone (:mod:`~femmembrane.physics.magnetisation`).
+    chamber : Chamber, optional
+        The chamber of gas behind the membrane, for runs by amounts of gas and verdicts at a held amount.
 
     Raises
     ------
@@ -129,6 +133,7 @@ class Scene:
     remanence: Any = None
     remanence_direction: str | None = None
     remanence_transport: str | None = None
+    chamber: Chamber | None = None
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -136,6 +141,7 @@ class Scene:
             "mesh", self.mesh, ("breakpoints", "position", "tangent", "supports"), "a mesh is allowed, such as disc(elements=64)"
         )
         _check_interface("run", self.run, () if self.run is None else ("loads",), "a Run is allowed")
+        _check_interface("chamber", self.chamber, () if self.chamber is None else ("volume", "atmosphere"), "a Chamber is allowed")
         _check_interface("analysis", self.analysis, ("stability", "azimuthal_modes", "wrinkling"), "an Analysis is allowed")
         sources = sequence("source", self.sources, "a list of sources is allowed, such as [Dipole(strength=..., height=...)]")
         loads = sequence("load", self.loads, "a list of loads is allowed, such as [Weight(weight=...)]")
@@ -170,6 +176,16 @@ class Scene:
         lift = lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
         self._check_sources(lift)
         self._check_hubs()
+        self._check_run()
+
+    def _check_run(self) -> None:
+        """A run over a number has that number, and gas has its chamber."""
+        run = self.run
+        if run is not None and isinstance(number := getattr(run, "number", None), str) and number not in (known := names(self)):
+            raise unknown_name("run.over" if run.over else "run.control", number, known or ["(this scene has no number to vary)"])
+        gas = run is not None and (run.control == GAS or GAS in (run.hold or ()))
+        if self.chamber is None and (gas or GAS in self.analysis.stability):
+            raise InputError("chamber", None, "missing; an amount of gas needs the volume of its chamber: give chamber.volume")
 
     def _check_size(self) -> None:
         """Refuse a scene that the memory has no room for, before anything is built."""

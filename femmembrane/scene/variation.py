@@ -4,6 +4,8 @@
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
 ``membrane.susceptibility``  chi; ``membrane.saturation`` and ``membrane.remanence``, where they are numbers
+``membrane.prestretch``  p of a flat disc or annulus, or of a tube
+``chamber.NAME``         volume or atmosphere of the chamber of gas
 ``material.NAME``        a number of a material that has such an argument; others change with it where its ``numbers_with`` says so
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
 ``material.alpha.K``     exponent K of Ogden's material; mu_K changes with it so that mu_K alpha_K stays
@@ -24,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..discretization.lift import lift_of
 from ..errors import InputError, unknown_name
 from ..physics.magnetisation import Magnetisation
 from ..physics.materials import Ogden
@@ -71,6 +74,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return float(getattr(self.scene, rest) or 0.0)
+        if part == "chamber":
+            return float(getattr(self.scene.chamber, rest))
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
         owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
@@ -90,6 +95,9 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return self.scene.replace(**{rest: value})
+        if part == "chamber":
+            chamber: Any = self.scene.chamber
+            return self.scene.replace(chamber=dataclasses.replace(chamber, **{rest: value}))
         if part == "material":
             material: Any = self.scene.material
             if rest.startswith("mu."):
@@ -114,7 +122,12 @@ class Parameter:
         loads: tuple[Any, ...] = scene.loads
         susceptibility = scene.susceptibility
         magnetisation = {name: getattr(scene, name) for name in MAGNETISATION}
-        if rest in magnetisation:
+        lifted: dict[str, Any] = {}
+        if part == "chamber":  # of the control, and of no potential
+            pass
+        elif rest == "prestretch":  # the lift of p is p - 1 times that of 2
+            lifted = {"prestretch": 2.0, "lifted": value - 1}
+        elif part == "membrane" and rest in magnetisation:
             magnetisation[rest] = value
         elif part == "membrane" and Magnetisation.of(scene) is not None:
             susceptibility = value
@@ -135,7 +148,7 @@ class Parameter:
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
         kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
-        return SimpleNamespace(**parts, **magnetisation, **{name: getattr(scene, name) for name in kept})
+        return SimpleNamespace(**parts, **magnetisation, **{**{name: getattr(scene, name) for name in kept}, **lifted})
 
     def _check_modulus(self, value: float, alpha: float) -> None:
         if not 0 < value * alpha < 2:
@@ -166,10 +179,21 @@ def names(scene: Scene) -> list[str]:
     if scene.sources:
         found.append("membrane.susceptibility")
         found += [f"membrane.{name}" for name in ("saturation", "remanence") if isinstance(getattr(scene, name), Real)]
+    if _can_be_stretched(scene):
+        found.append("membrane.prestretch")
+    if getattr(scene, "chamber", None) is not None:
+        found += [f"chamber.{name}" for name in _numbers(scene.chamber)]
     material = scene.material
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]
     return found + [f"material.{name}" for name in _numbers(material)]
+
+
+def _can_be_stretched(scene: Scene) -> bool:
+    try:
+        return lift_of(scene.mesh, 2.0) is not None
+    except InputError:
+        return False
 
 
 def _numbers(owner: Any) -> list[str]:

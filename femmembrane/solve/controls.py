@@ -171,6 +171,49 @@ class Gas:
         return absolute * total - self.amount, absolute * evaluation.volume_gradient, total
 
 
+@dataclass(frozen=True)
+class GasOver(Gas):
+    """A fixed amount of gas of which the chamber or the atmosphere is the number that changes.
+
+    Parameters
+    ----------
+    varies : {"chamber", "atmosphere"}
+        Which of them; further parameters as for :class:`Gas`.
+    """
+
+    varies: str = "chamber"
+
+    def over(self, number: float) -> Gas:
+        """The gas at a value of the number.
+
+        Parameters
+        ----------
+        number : float
+        """
+        return replace(self, chamber=number) if self.varies == "chamber" else replace(self, atmosphere=number)
+
+    def number_rate(self, pressure: float, volume: float) -> float:
+        """Derivative of the equation with respect to the number.
+
+        Parameters
+        ----------
+        pressure, volume : float
+            Of the state.
+        """
+        return pressure + self.atmosphere if self.varies == "chamber" else volume + self.chamber
+
+
+def at_number(control: Control, number: float) -> Control:
+    """A control at a value of the number of a family: only that of a gas may change with it.
+
+    Parameters
+    ----------
+    control : Control
+    number : float
+    """
+    return control.over(number) if isinstance(control, GasOver) else control
+
+
 @dataclass(slots=True, eq=False)
 class ArcLengthControl:
     """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0. ``dual`` is the tangent with the inner product already applied."""

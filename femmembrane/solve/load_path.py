@@ -47,25 +47,45 @@ class Turn:
             return None
         return Status.NOT_A_MINIMUM if self.fold.kind == "branch_point" else Status.NO_EQUILIBRIUM
 
+    def place(self, state: State) -> str:
+        """Where the fold is, in words."""
+        return f"P = {state.pressure:.9g}, V = {state.volume:.9g}"
+
+    @property
+    def kind(self) -> str:
+        """What the fold is, in words."""
+        return self.fold.kind.replace("_", " ") if self.fold else ""
+
     def __str__(self) -> str:
         fold, landing = self.fold, self.limit.landing
         if fold is None:
             return "steps in the load did not converge there, and along the branch no fold in it was met"
         at = fold.point.state
         if fold.kind == "branch_point":
-            where = (
-                f"the branch lost stability at the branch point P = {at.pressure:.9g}, V = {at.volume:.9g}, where another one crosses it"
-            )
+            where = f"the branch lost stability at the branch point {self.place(at)}, where another one crosses it"
             if landing is None:
                 return f"{where}, on which no stable state was met at this load"
             return f"{where}, on which the membrane would go to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
-        what = fold.kind.replace("_", " ")
-        where = f"the branch turns back: the {what} is P = {at.pressure:.9g}, V = {at.volume:.9g}"
+        where = f"the branch turns back: the {self.kind} is {self.place(at)}"
         if landing is None:
             last = self.limit.last
             far = "" if last is None else f", as far as V = {last.volume:.6g}, P = {last.pressure:.6g}"
             return f"{where}; it was followed on{far}, without meeting a stable state at this load"
         return f"{where}, from which the membrane would jump to V = {landing.volume:.6g}, P = {landing.pressure:.6g}"
+
+
+@dataclass(frozen=True)
+class NumberTurn(Turn):
+    """The same over a number of the scene, with its name."""
+
+    number: str
+
+    def place(self, state: State) -> str:
+        return f"{self.number} = {state.evaluation.factor:.9g} ({super().place(state)})"
+
+    @property
+    def kind(self) -> str:
+        return "last value"
 
 
 class LoadPath:

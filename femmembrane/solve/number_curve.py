@@ -15,9 +15,10 @@ every point. Cost is linear in the elements.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -26,14 +27,24 @@ from ..errors import SolveError, Status
 from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .branch import AT_CROSSING, FOLDS, BranchProblem
-from .continuation import BranchPoint, CurveProblem
-from .controls import CONTROLS, Control
+from .continuation import BranchPoint, CurveProblem, StepControl, Tracer, trace_points
+from .controls import CONTROLS, Control, PressureControl, at_number
 from .newton import TOLERANCE, relative_residual, relative_size
+from .search import FAR, Limit
+from .segment import Located, Segment
+from .special_points import branch_point
+from .start import moderate
 from .state import Predictor, State
+from .stepping import control_rate
+from .wellposed import ill_posed
 
 #: name of the number among the quantities of a curve, and of a point at which it is stationary among the folds
-NUMBER, TURN = "number", "turn"
+NUMBER, TURN = "number", "number_fold"
 _MAX_ITERATIONS = 12
+#: rate of the volume, in units of the membrane, that is told from zero
+_STATIONARY = 1e-8
+#: bounds of a number that may have any value
+ANY = (-math.inf, math.inf)
 #: smallest change of the number, relative to its scale, that is told from round-off: a curve that approaches a value hardly moves in it
 _RESOLUTION = 1e-13
 
@@ -198,6 +209,16 @@ class NumberProblem(CurveProblem[NumberPoint]):
         row = self.number_row
         return self._newton(guess, self.first_borders(guess), _hyperplane(row, guess), direction * row)[0]
 
+    def first_at_turn(self, x: Array, pressure: float, number: float, direction: int) -> NumberPoint | None:
+        """The point next to a guess at which the number may be stationary, in the plane across the softest displacement."""
+        guess = np.concatenate([x, [pressure, number]])
+        borders = self.first_borders(guess)
+        row = np.concatenate([borders.deflation, [0.0, 0.0]])
+        point = self._newton(guess, borders, _hyperplane(row, guess), direction * row)[0]
+        if point is None or abs(point.rate("volume")) <= _STATIONARY * self.units["volume"] or point.rate("volume") * direction > 0:
+            return point
+        return replace(point, tangent=-point.tangent, dual=-point.dual)
+
     def first_borders(self, z: Array, sweeps: int = 6) -> Borders:
         """The mode of K closest to zero, by inverse iteration from the shape of the volume gradient."""
         equations = self._at_start(z)
@@ -216,6 +237,10 @@ class NumberProblem(CurveProblem[NumberPoint]):
 
     def place(self, point: NumberPoint) -> str:
         return f"{point.number:.9g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+
+    def settled(self, z: Array) -> Array:
+        """A corrected guess, with what is known exactly put in."""
+        return z
 
     @abstractmethod
     def at(self, z: Array, borders: Borders) -> Equations:
@@ -250,7 +275,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
             if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * tolerance):
                 return None, iteration
             previous = size
-            z = z + np.concatenate([dx, rest])
+            z = self.settled(z + np.concatenate([dx, rest]))
         return None, _MAX_ITERATIONS
 
     def _point(self, equations: Equations, jacobian: WideBorder, iterations: int, correction: float, orientation: Array) -> NumberPoint:
@@ -272,8 +297,11 @@ def _hyperplane(row: Array, guess: Array) -> _Closing:
 
 def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:
     """Value and derivatives of a control with respect to (x, P, m)."""
-    gap, row, corner = control.equation(equations.problem.family.space, equations.x, equations.pressure, equations.evaluation)
-    return gap, np.concatenate([row, [corner, 0.0]])
+    state = equations.x, equations.pressure, equations.evaluation
+    control = at_number(control, equations.number)
+    gap, row, corner = control.equation(equations.problem.family.space, *state)
+    rate = control_rate(equations.problem.family, control, equations.x, equations.pressure, equations.evaluation)
+    return gap, np.concatenate([row, [corner, rate]])
 
 
 class ControlledProblem(NumberProblem):
@@ -285,7 +313,10 @@ class ControlledProblem(NumberProblem):
         N(x, P) = 0; further parameters as for :class:`NumberProblem`.
     """
 
-    def __init__(self, family: Family, control: Control, scale: float, bounds: tuple[float, float]) -> None:
+    #: a membrane that a far source has all but left alone is soft, and rates of what hardly moves are round-off
+    resolution = 1e-9
+
+    def __init__(self, family: Family, control: Control, scale: float, bounds: tuple[float, float] = ANY) -> None:
         super().__init__(family, scale, bounds)
         self.control = control
         # what is held turns nowhere
@@ -293,6 +324,23 @@ class ControlledProblem(NumberProblem):
 
     def at(self, z: Array, borders: Borders) -> Equations:
         return _Controlled(self, z, borders)
+
+    def settled(self, z: Array) -> Array:
+        if isinstance(self.control, PressureControl):
+            z[-2] = self.control.pressure
+        return z
+
+    def predict(self, path: Predictor, point: NumberPoint, step: float) -> tuple[float, Array, Array]:
+        """As of any curve; a step towards values that no scene has ends on the last value that one has."""
+        aim = float(path.predict(point.sigma + step)[-1])
+        if min(self.bounds) < aim < max(self.bounds) and np.isfinite(aim) and not self.family.takes(aim):
+            last = self.family.last_value(point.number, aim)
+            self.bounds = (last, self.bounds[1]) if aim < last else (self.bounds[0], last)
+        return super().predict(path, point, step)
+
+    def forbids(self, before: NumberPoint, after: NumberPoint) -> bool:
+        member = self.family.member
+        return member(after.number).came_through_source(after.state.x, member(before.number), before.state.x)
 
 
 class _Controlled(Equations):
@@ -303,15 +351,71 @@ class _Controlled(Equations):
         self.force_number = self.problem.family.number_derivative(self.x, self.pressure, self.number)
 
 
+def beyond_turn(
+    problem: ControlledProblem,
+    point: NumberPoint,
+    number: float,
+    stable: Callable[[State], bool],
+    *,
+    any_before: bool,
+    beside: Callable[[Located[NumberPoint]], State | None],
+    max_steps: int = 300,
+) -> Limit:
+    """Follow a branch from the last point before a number that was not reached by steps in the number itself.
+
+    Where it turns back the next stable state is looked for beside it, then farther along it.
+
+    Parameters
+    ----------
+    problem, point : ControlledProblem, NumberPoint
+        Where it sets out, oriented towards the number.
+    number : float
+    stable : callable
+        Whether a state is a minimum under the control.
+    any_before : bool
+        Whether a state before the turn will do that is none.
+    beside : callable
+        The stable state that the membrane goes to from a turn, at the number; None where none was met.
+    """
+    family, fold, last = problem.family, None, point.state
+    points = trace_points(problem, point, Tracer(Predictor(), StepControl().first))
+    for _ in range(max_steps):
+        try:
+            new = next(points)
+        except SolveError:
+            break
+        segment = Segment(problem, point, new)
+        if ill_posed(family.member(new.number), new.state.evaluation) is not None:
+            return Limit(fold, None, new.state, last)
+        last = new.state
+        if fold is None:
+            found = [*segment.folds(TURN), *filter(None, [None if any_before else branch_point(segment)])]
+            fold = min(found, key=lambda located: located.point.sigma, default=None)
+            if fold is not None and fold.kind == TURN and not any(m.sigma < fold.point.sigma for m in segment.crossings(NUMBER, number)):
+                landing = beside(fold)
+                if landing is not None:
+                    return Limit(fold, landing, last=fold.point.state)
+        for met in segment.crossings(NUMBER, number):
+            before = fold is None or met.sigma < fold.point.sigma
+            if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
+                return Limit(None if before else fold, met.state, last=met.state)
+        if new.number in problem.bounds or abs(new.state.volume) > FAR * moderate(family):
+            break
+        point = new
+    return Limit(fold, None, last=last)
+
+
 def first_controlled(problem: ControlledProblem, x: Array, pressure: float, number: float, direction: int) -> NumberPoint:
     """The equilibrium next to a guess at the same value of the number, oriented towards larger ones for direction +1.
+
+    Where the branch turns in the number it is oriented towards larger volumes.
 
     Raises
     ------
     SolveError
-        When there is none next to it, or the branch turns there.
+        When there is none next to it.
     """
-    point = problem.first(x, pressure, number, direction)
+    point = problem.first(x, pressure, number, direction) or problem.first_at_turn(x, pressure, number, direction)
     if point is None:
         raise SolveError("the start is not near an equilibrium of this scene under the control", status=Status.NOT_CONVERGED)
     return point

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -259,7 +260,7 @@ class Limit:
     either was met. What follows depends on the mesh.
     """
 
-    fold: Located[BranchPoint] | None
+    fold: Located[Any] | None
     landing: State | None
     ill_posed: State | None = None
     last: State | None = None

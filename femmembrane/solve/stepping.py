@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import SolveError, Status
-from ..potential import Array, Potential
-from .controls import Control
+from ..potential import Array, Evaluation, Family, Potential
+from .controls import Control, Gas, GasOver, VolumeControl
 from .newton import NewtonResult, correct
 from .state import Predictor, State, distance, joined
 from .wellposed import apparent, is_slack, slackness
@@ -54,8 +54,8 @@ def march(
         Memory of the steps before, extended in place.
     corrector : callable
         :func:`.newton.correct` or a minimiser with its signature.
-    parameter : {"load", "magnetic"}
-        Whether the parameter is the control's own value or the factor on the magnetic energy.
+    parameter : {"load", "magnetic", "number"}
+        Whether the parameter is the control's own value, the factor on the magnetic energy, or the number of a :class:`.Family`.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def march(
         ``result`` holds the states accepted before.
     """
     path = Predictor() if path is None else path
-    factor_of = (lambda value: value) if parameter == "magnetic" else (lambda value: magnetic)
+    factor_of = (lambda value: magnetic) if parameter == "load" else (lambda value: value)
     if not path.sigma:
         path.append(start, joined(state.x, state.pressure), joined(*_slope(potential, state, control_at(start), parameter, start)))
     accepted = [state]
@@ -87,14 +87,14 @@ def march(
             and distance(potential, result.x, x) <= MAX_DEVIATION * reach + 1e-9 * max(potential.largest(x)) / potential.space.unit
         ):
             new = State.of(result, spent - result.iterations)
-            if parameter == "load" and magnetic and potential.passed_source(accepted[-1].x, new.x):
+            if _through_source(potential, accepted[-1], new, parameter):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"
                 raise SolveError(message, status=Status.DIPOLE_CONTACT, result=accepted)
             path.append(there, joined(new.x, new.pressure), joined(*_slope(potential, new, control_at(there), parameter, there)))
             accepted.append(new)
             here, spent = there, 0
             step *= 2
-            if parameter == "load" and here != stop and is_slack(potential, new):
+            if parameter != "magnetic" and here != stop and is_slack(potential, new):
                 raise slackness(potential, new, accepted)
         else:
             step = (there - here) / 2
@@ -102,11 +102,29 @@ def march(
             way = abs(stop - here) if parameter == "magnetic" else min(abs(stop - start), abs(here) or np.inf)
             if abs(step) < max(MIN_STEP * way, ROUND_OFF * abs(stop - start)):
                 message = f"the branch could not be followed beyond {here:.9g} on the way to {stop:.9g}"
-                bad = apparent(potential, accepted[-1].evaluation) if parameter == "load" else None
+                bad = None if parameter == "magnetic" else apparent(potential, accepted[-1].evaluation)
                 if bad is not None:
                     raise SolveError(f"{message}: {bad}", status=bad.status, result=accepted)
                 raise SolveError(message, status=Status.STEP_UNDERFLOW, result=accepted)
     return accepted[1:]
+
+
+def _through_source(potential: Potential, before: State, after: State, parameter: str) -> bool:
+    """Whether the membrane went through a source on a step; while sources are turned on nobody asks."""
+    if parameter == "number" and isinstance(potential, Family):
+        member = potential.member
+        return member(after.evaluation.factor).came_through_source(after.x, member(before.evaluation.factor), before.x)
+    return parameter == "load" and bool(after.evaluation.factor) and potential.passed_source(before.x, after.x)
+
+
+def control_rate(family: Family, control: Control, x: Array, pressure: float, evaluation: Evaluation) -> float:
+    """Derivative of the equation of a control with respect to the number of a family, at a fixed (x, P)."""
+    rate = control.number_rate(pressure, evaluation.volume) if isinstance(control, GasOver) else 0.0
+    if isinstance(control, VolumeControl):
+        rate += family.volume_derivative(x, evaluation.factor)
+    elif isinstance(control, Gas):
+        rate += (pressure + control.atmosphere) * family.volume_derivative(x, evaluation.factor)
+    return rate
 
 
 def _slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> tuple[Array, float]:
@@ -116,5 +134,8 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     bordered = evaluation.border(row, corner)
     if parameter == "load":
         return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
+    if parameter == "number" and isinstance(potential, Family):
+        rate = control_rate(potential, control, state.x, state.pressure, evaluation)
+        return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)
     other = potential.evaluate(state.x, state.pressure, value + 1.0)  # the gradient is linear in the factor: an exact derivative
     return bordered.solve(evaluation.gradient - other.gradient, 0.0)

@@ -7,6 +7,7 @@ from .follow import equilibrium as equilibrium
 from .follow import inflate as inflate
 from .follow import pressurize as pressurize
 from .follow import run as run
+from .follow import vary as vary
 from .search import equilibria as equilibria
 from .trace import trace as trace
 from .trace import trace_iter as trace_iter

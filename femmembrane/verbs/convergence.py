@@ -108,7 +108,9 @@ def convergence_of_run(scene: Scene, *, degrees: Sequence[int], elements: Sequen
     branch = run(plain)
     if branch.status is not Status.CONVERGED or plain.run is None:
         raise SolveError(branch.message or str(branch.status), status=branch.status, result=branch)
-    if plain.run.until is not None:
+    if branch.hold:  # at the last value of the number
+        ((name, load),) = branch.hold.items()
+    elif plain.run.until is not None:
         ((name, load),) = plain.run.until.items()
     else:
         name, load = control_kind(plain.run.control).name, float(plain.run.loads()[-1])

@@ -28,6 +28,7 @@ from ..results.equilibrium import Equilibrium
 from ..results.store import save
 from ..results.table import write_csv
 from ..scene import MAX_DEGREE, Analysis, Scene
+from ..scene.run import GAS
 from ..solve.banded import BandFactor, BorderedFactor
 from ..solve.controls import CONTROLS, control_kind
 from ..solve.start import cold_start
@@ -163,6 +164,8 @@ def asked_load(scene: Scene) -> dict[str, Any]:
     """
     if scene.run is None:
         raise InputError("run", None, "missing; the load that is studied is the last one of [run]")
+    if scene.run.number is not None or scene.run.control == GAS:
+        raise InputError("run.control", scene.run.number or GAS, "a run by volume, pressure, height or arc length is studied")
     if scene.run.control == "arc-length":
         return dict(scene.run.until or {})
     return {control_kind(scene.run.control).name: float(scene.run.loads()[-1])}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..checks import sign
 from ..errors import InputError, SolveError, Status
-from ..potential import Array, Evaluation, Family, Potential, potential_of
+from ..potential import Array, Evaluation, Family, Potential
 from ..results.equilibrium import Equilibrium
 from ..results.folds import Cusp, FoldCurve
 from ..results.special_point import SpecialPoint
@@ -26,6 +26,7 @@ from ..solve.segment import Located, Segment
 from ..solve.state import Predictor
 from ..threads import one_thread
 from .arguments import check_ill_posed, check_max_steps, check_scene
+from .over_number import family_of
 from .running import End, Run
 from .state_records import record
 
@@ -154,7 +155,7 @@ class FoldRun(Run[FoldCurve]):
 
     def __init__(self, scene: Scene, request: FoldRequest) -> None:
         clock, start = time.perf_counter(), request.start
-        family = Family(scene, request.parameter.vary)
+        family = family_of(request.parameter)
         super().__init__(scene, family, ("setup", "solve", "cusps"))
         _check_start(start, family)
         self.request, self.parameter, self.bounds = request, request.parameter, request.bounds
@@ -226,10 +227,8 @@ class FoldRun(Run[FoldCurve]):
         return record(self.parameter.scene_at(point.number), potential, replace(point.state, evaluation=evaluation))
 
     def _own(self, point: NumberPoint) -> tuple[Potential, Evaluation]:
-        """Potential and evaluation of a point: those of its own scene where a finer space must be asked whether a compression is real."""
-        if wellposed.apparent(self.problem.family, point.state.evaluation) is None:
-            return self.problem.family, point.state.evaluation
-        potential = potential_of(self.parameter.scene_at(point.number))
+        """Potential and evaluation of a point as one of its own scene."""
+        potential = self.problem.family.member(point.number)
         return potential, potential.evaluate(point.state.x, point.state.pressure)
 
     def _clearance(self, point: NumberPoint) -> float:

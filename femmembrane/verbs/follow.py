@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,15 @@ from ..results.branch import Branch
 from ..results.checkpoint import same_scene
 from ..results.equilibrium import Equilibrium
 from ..scene import Scene
+from ..scene.run import GAS
 from ..solve.controls import CONTROLS, Controlled, Gas, control_kind
 from ..threads import one_thread
 from .arguments import check_scene
 from .load_run import LoadRequest, checked_loads
 from .meshing import on_chosen_mesh
+from .number_run import NumberRequest
+from .number_trace import NumberTraceRequest
+from .over_number import gas_of
 from .running import carry_out
 from .state_records import OnCheckpoint, OnStep
 from .trace_run import TraceRequest, checked_targets
@@ -120,6 +125,62 @@ def pressurize(
     """
     request = LoadRequest(CONTROLS["pressure"], checked_loads("pressures", pressures), start, solver, at_limit, throw)
     return _follow(scene, request, on_step=on_step)
+
+
+@one_thread
+def vary(
+    scene: Scene,
+    over: str,
+    values: ArrayLike,
+    *,
+    hold: Mapping[str, float],
+    start: Equilibrium | None = None,
+    solver: str = "ipopt",
+    at_limit: str = "stop",
+    throw: bool = True,
+    on_step: OnStep | None = None,
+) -> Branch:
+    """Follow the membrane through given values of a number of the scene, in the order given, while a quantity is held.
+
+    Every equilibrium has the scene with its own value, and the branch has the number as a column.
+
+    Parameters
+    ----------
+    scene : Scene
+    over : str
+        Name of the number, such as ``source.0.height``: see :mod:`femmembrane.scene.variation`.
+    values : array_like
+        Its values.
+    hold : mapping
+        What is held: a value of one of volume, pressure and center_height.
+    start : Equilibrium, optional
+        An equilibrium of the scene with any value of the number; default: as :func:`equilibrium` finds one at the first value.
+    solver, at_limit, throw, on_step
+        As in :func:`inflate`. With ``at_limit="jump"`` the membrane snaps where the branch turns back in the number.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError, SolveError
+        The latter carries the branch up to the failure as ``result``.
+
+    Examples
+    --------
+    A magnet comes nearer, and the membrane rises towards it:
+
+    >>> import femmembrane as fm
+    >>> magnet = fm.Dipole(strength=20.0, height=4.0)
+    >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), sources=[magnet], susceptibility=1.0)
+    >>> branch = fm.vary(scene, "source.0.height", [4.0, 3.0, 2.5], hold={"pressure": 0.0})
+    >>> [round(float(height), 4) for height in branch.column("center_height")]
+    [0.1065, 0.2384, 0.5635]
+    """
+    check_scene(scene)
+    common: dict[str, Any] = {"start": start, "solver": solver, "at_limit": at_limit, "throw": throw}
+    return _follow(scene, NumberRequest.checked(scene, values, over=over, hold=hold, **common), on_step=on_step)
 
 
 @one_thread
@@ -226,13 +287,21 @@ def run(
     asked = scene.run
     if unfinished is not None:
         scene = same_scene(scene, unfinished, "unfinished")
+    number = asked.number
+    solved: dict[str, Any] = {"solver": asked.solver, "at_limit": asked.at_limit}
     observed: dict[str, Any] = {"on_step": on_step, "on_checkpoint": on_checkpoint, "unfinished": unfinished}
     if asked.control == "arc-length":
-        targets = checked_targets(asked.until)
-        request = TraceRequest(asked.start, targets, direction=asked.direction, max_steps=asked.max_steps)
+        request = TraceRequest(asked.start, checked_targets(asked.until) if number is None else {}, asked.direction or 1, asked.max_steps)
+        if number is not None:
+            more: dict[str, Any] = {"direction": asked.direction, "max_steps": asked.max_steps}
+            request = NumberTraceRequest.over_number(scene, asked.start, asked.until, over=number, hold=asked.hold, **more)
         return carry_out(on_chosen_mesh(scene, request), **observed)
-    loads = LoadRequest(control_kind(asked.control), asked.loads(), solver=asked.solver, at_limit=asked.at_limit)
-    return _follow(scene, loads, **observed)
+    if number is not None:
+        values_key = "run.values" if asked.values is not None else "run.start"
+        over = NumberRequest.checked(scene, asked.loads(), over=number, hold=asked.hold, key="run.control", values_key=values_key, **solved)
+        return _follow(scene, over, **observed)
+    held = gas_of(scene, "run.control") if asked.control == GAS else control_kind(asked.control)
+    return _follow(scene, LoadRequest(held, asked.loads(), **solved), **observed)
 
 
 def _follow(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..accuracy.adapt import spread
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
-from ..potential import Array, potential_of
+from ..potential import Array, Potential, potential_of
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.path_memory import PathMemory
@@ -22,6 +22,7 @@ from ..scene import MAX_STEPS, Scene
 from ..scene.run import AT_LIMIT
 from ..solve.controls import CONTROLS, ControlKind, Controlled, Gas
 from ..solve.load_path import SOLVERS, LoadPath, Turn
+from ..solve.number_path import NumberPath
 from ..solve.state import State
 from ..solve.wellposed import slackness
 from .arguments import check_height
@@ -73,14 +74,18 @@ class LoadRequest(Request):
     def up_to(self, count: int) -> Self:
         return replace(self, loads=self.loads[: spread(self.loads)[count - 1] + 1])
 
+    def prepared(self, scene: Scene, on_step: OnStep | None) -> LoadRun:
+        """The run before it has a start."""
+        return LoadRun(scene, self, on_step)
+
     def begin(self, scene: Scene, on_step: OnStep | None = None) -> LoadRun:
-        run = LoadRun(scene, self, on_step)
+        run = self.prepared(scene, on_step)
         if self.start is not None:
             run.set_out(self.start)
         return run
 
     def go_on(self, scene: Scene, unfinished: Branch, on_step: OnStep | None = None) -> LoadRun:
-        run = LoadRun(scene, self, on_step)
+        run = self.prepared(scene, on_step)
         run.go_on(unfinished)
         return run
 
@@ -107,19 +112,23 @@ class LoadRun(Run[Branch]):
     ----------
     jumps : list of Jump
         Where it snapped to another state.
-    path : LoadPath
+    path : LoadPath or NumberPath
         Where the membrane stands.
     """
 
-    def __init__(self, scene: Scene, request: LoadRequest, on_step: OnStep | None = None) -> None:
-        clock, potential = time.perf_counter(), potential_of(scene)
+    def __init__(self, scene: Scene, request: LoadRequest, on_step: OnStep | None = None, potential: Potential | None = None) -> None:
+        clock, potential = time.perf_counter(), potential or potential_of(scene)
         if request.held is CONTROLS["center_height"]:
             check_height("center_height", potential)
         super().__init__(scene, potential, ("setup", "solve", "verdicts"))
         self.timings["setup"] = time.perf_counter() - clock
         self.request, self.on_step = request, on_step
         self.jumps: list[Jump] = []
-        self.path = LoadPath(potential, request.held, request.solver)
+        self.path = self.new_path()
+
+    def new_path(self) -> LoadPath | NumberPath:
+        """The path before its first load."""
+        return LoadPath(self.potential, self.request.held, self.request.solver)
 
     def set_out(self, start: Equilibrium) -> None:
         """Stand at a start, which is solved again: it may be of another scene, or of another mesh."""
@@ -133,7 +142,12 @@ class LoadRun(Run[Branch]):
             raise InputError("unfinished", unfinished, "a branch that on_checkpoint was called with is allowed")
         self.found, self.jumps = list(unfinished), list(unfinished.jumps)
         self.timings |= unfinished.timings
-        self.path.go_on(restore(self.potential, unfinished[-1]), float(self.request.loads[count - 1]), predictor_of(memory))
+        load = float(self.request.loads[count - 1])
+        self.path.go_on(self.restored(unfinished[-1], load), load, predictor_of(memory))
+
+    def restored(self, last: Equilibrium, load: float) -> State:
+        """The state of the last equilibrium, at its load."""
+        return restore(self.potential, last)
 
     def step(self) -> End | None:
         index, loads = len(self.found), self.request.loads
@@ -146,29 +160,39 @@ class LoadRun(Run[Branch]):
         except SolveError as error:
             return error.status, self._not_reached(index, str(error))
         with self.timed("verdicts"):
-            gas = self.request.held.at(self.path.load) if isinstance(self.request.held, Gas) else None
-            new = record(self.scene, self.potential, state, self.found[-1] if self.found else None, clock, gas)
+            own, scene = self.own(state), self.scene_of(state)
+            new = record(scene, own.evaluation.potential, own, self.found[-1] if self.found else None, clock, self.gas)
         if turn is not None:
             self.jumps.append(Jump(index, self._limit(turn), new))
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(index, len(loads), new)
-        return self._slack(state) if new.status is Status.SLACK else None
+        return self._slack(own) if new.status is Status.SLACK else None
+
+    @property
+    def gas(self) -> Gas | None:
+        """The gas that holds the state at hand."""
+        return self.request.held.at(self.path.load) if isinstance(self.request.held, Gas) else None
 
     def _slack(self, state: State) -> End | None:
         """The end at a slack membrane, which is no start for another load; a last one may be what was asked for."""
-        index, message = len(self.found), str(slackness(self.potential, state))
+        index, message = len(self.found), str(slackness(state.evaluation.potential, state))
         if index < len(self.request.loads):
             return Status.SLACK, self._not_reached(index, message)
         return None if self.request.throw else (Status.SLACK, message)
 
+    @property
+    def words(self) -> str:
+        """What the loads are, in words."""
+        return self.request.held.words
+
     def _not_reached(self, index: int, why: str) -> str:
-        return f"{self.request.held.words} {self.request.loads[index]:.9g} was not reached: {why}"
+        return f"{self.words} {self.request.loads[index]:.9g} was not reached: {why}"
 
     def _limit(self, turn: Turn) -> SpecialPoint | None:
         if turn.fold is None:
             return None
-        return special_point(self.scene.replace(analysis=type(self.scene.analysis)()), self.potential, turn.fold)
+        return special_point(self, self.scene_of(turn.fold.point.state).replace(analysis=type(self.scene.analysis)()), turn.fold)
 
     def _load_of(self, start: Equilibrium, state: State) -> float:
         """The load of a start as it was given; that of the state it was corrected to where the two differ, as in another scene."""
@@ -180,6 +204,6 @@ class LoadRun(Run[Branch]):
         return given if abs(found - given) <= 1e-9 * max(abs(given), self.potential.space.units[held.name]) else found
 
     def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
-        memory = None if found is None else remembered(self.path.memory, self.potential.space.n_free)
+        memory = None if found is None else remembered(self.path.memory, self.potential.space.n_free + 1)
         known = tuple(self.found) if found is None else found
         return Branch(self.scene, known, status, message, dict(self.timings), None, memory, tuple(self.jumps), self.path.solver)

@@ -18,6 +18,7 @@ from ..potential import Potential
 from ..results.branch import Branch, SoFar
 from ..results.equilibrium import Equilibrium
 from ..scene import Scene
+from ..solve.state import State
 from .state_records import OnCheckpoint, OnStep
 
 if TYPE_CHECKING:
@@ -82,6 +83,14 @@ class Run(ABC, Generic[R]):
         self.found: list[Equilibrium] = []
         self.timings = dict.fromkeys(stages, 0.0)
         self.shortfall: Shortfall | None = None
+
+    def own(self, state: State) -> State:
+        """A state of the solver as one of its own scene."""
+        return state
+
+    def scene_of(self, state: State) -> Scene:
+        """The scene of a state."""
+        return self.scene
 
     @abstractmethod
     def step(self) -> End | None:

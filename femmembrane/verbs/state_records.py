@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from ..solve.newton import RESIDUAL, correct, relative_residual
 from ..solve.segment import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
+
+if TYPE_CHECKING:
+    from .running import Run
 
 OnStep = Callable[[int, int, Equilibrium], None]
 #: called after each step with the branch so far, from which the run can be resumed
@@ -42,8 +46,10 @@ def resume(potential: Potential, start: Equilibrium) -> State:
     return State.of(result)
 
 
-def restore(potential: Potential, kept: Equilibrium) -> State:
+def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> State:
     """The solver's state of an equilibrium of this very scene, to the last bit: it is looked at, not solved again.
+
+    In a family of scenes it is one of the scene with a value of the number.
 
     Raises
     ------
@@ -52,7 +58,7 @@ def restore(potential: Potential, kept: Equilibrium) -> State:
     """
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
-    evaluation = potential.evaluate(kept.state, kept.pressure)
+    evaluation = potential.evaluate(kept.state, kept.pressure, number)
     force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
     residual = relative_residual(potential, force, evaluation, kept.pressure)
     if not residual <= max(RESIDUAL, 10 * kept.residual):
@@ -61,8 +67,8 @@ def restore(potential: Potential, kept: Equilibrium) -> State:
 
 
 def remembered(path: Predictor, unknowns: int) -> PathMemory:
-    """A copy of a path, for the record."""
-    shape = (len(path.sigma), unknowns + 1)
+    """A copy of a path in so many unknowns, for the record."""
+    shape = (len(path.sigma), unknowns)
     return PathMemory(tuple(path.sigma), np.array(path.point).reshape(shape), np.array(path.slope).reshape(shape))
 
 
@@ -107,8 +113,10 @@ def record(
     return equilibrium
 
 
-def special_point(scene: Scene, potential: Potential, located: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
+def special_point(run: Run[Branch], scene: Scene, located: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
     """The public record of a located point. A branch point has the direction of its branch, which tells it from the crossing branch."""
-    point, eq = located.point, record(scene, potential, located.point.state)
-    tangent = point.tangent.copy() if located.kind == "branch_point" else None
+    point, state = located.point, run.own(located.point.state)
+    eq = record(scene, state.evaluation.potential, state)
+    # over a number the direction is none of the branch of one scene
+    tangent = point.tangent.copy() if located.kind == "branch_point" and len(point.tangent) == len(state.x) + 1 else None
     return SpecialPoint(located.kind, eq.volume, eq.pressure, eq.center_height, located.error, eq, azimuthal=azimuthal, tangent=tangent)

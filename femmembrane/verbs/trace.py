@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from ..errors import SolveError, Status
 from ..results.branch import Branch
@@ -13,6 +14,7 @@ from ..solve.continuation import StepControl
 from ..threads import one_thread
 from .arguments import check_scene
 from .meshing import on_chosen_mesh
+from .number_trace import NumberTraceRequest
 from .running import carry_out
 from .state_records import OnCheckpoint, OnStep
 from .trace_run import TraceRequest
@@ -24,7 +26,9 @@ def trace(
     *,
     start: float | Equilibrium | SpecialPoint | Branch | None = None,
     until: Mapping[str, float] | None = None,
-    direction: int = 1,
+    over: str | None = None,
+    hold: Mapping[str, float] | None = None,
+    direction: int | None = None,
     max_steps: int = 400,
     steps: StepControl | None = None,
     special_points: bool = True,
@@ -49,9 +53,16 @@ def trace(
     until : mapping, optional
         Where to end: values of any of volume, pressure and center_height. The first value that is met ends the trace, and the last point
         lies exactly on it. The start itself does not count. A value behind the start is met on a distant part of the branch, if at all: see
-        ``direction``.
-    direction : {1, -1}
-        1 sets out towards larger volume. From a branch point it names a half of the crossing branch: on half 1 the volume grows. Where the
+        ``direction``. Over a number it may be a value of that, by its name.
+    over : str, optional
+        A number of the scene that changes along the branch in place of the load, such as ``source.0.height``: see
+        :mod:`femmembrane.scene.variation`. It sets out from its value in ``scene``, and every equilibrium has its own scene.
+    hold : mapping, optional
+        What is held meanwhile: a value of one of volume, pressure and center_height. The membrane is first brought there from ``start``;
+        without a start, as :func:`equilibrium` finds it.
+    direction : {1, -1}, optional
+        1 (default) sets out towards larger volume. Over a number it sets out towards larger numbers; the default is then the way to the
+        number in ``until``. From a branch point it names a half of the crossing branch: on half 1 the volume grows. Where the
         volume is stationary, as on both halves of a pitchfork, the pole rises on half 1 (or the membrane, if the pole is held).
     max_steps : int
         Most steps along the branch.
@@ -94,9 +105,11 @@ def trace(
     ('unstable', 'stable')
     """
     check_scene(scene)
-    request = TraceRequest.checked(
-        start, until, direction=direction, max_steps=max_steps, steps=steps, ill_posed=ill_posed, special_points=special_points
-    )
+    common: dict[str, Any] = {"max_steps": max_steps, "steps": steps, "ill_posed": ill_posed, "special_points": special_points}
+    if over is None and hold is None:
+        request = TraceRequest.checked(start, until, direction=1 if direction is None else direction, **common)
+    else:
+        request = NumberTraceRequest.over_number(scene, start, until, over=over, hold=hold, direction=direction, **common)
     branch = carry_out(on_chosen_mesh(scene, request), on_step=on_step, on_checkpoint=on_checkpoint)
     if throw and branch.message and (until is not None or branch.status is not Status.STEP_LIMIT):
         raise SolveError(branch.message, status=branch.status, result=branch)

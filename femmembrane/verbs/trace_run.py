@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
@@ -17,9 +17,9 @@ from ..results.path_memory import TraceMemory
 from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..solve import state_resolution, wellposed
-from ..solve.branch import FOLDS, BranchProblem, first_point, oriented_point
+from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import stopped_by_source, touches_source
-from ..solve.continuation import BranchPoint, StepControl, Tracer, trace_points
+from ..solve.continuation import BranchPoint, CurveProblem, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
@@ -105,22 +105,21 @@ class TraceRequest(Request):
         return replace(self, max_steps=count - 1, targets={})
 
     def begin(self, scene: Scene, on_step: OnStep | None = None) -> TraceRun:
-        clock, run = time.perf_counter(), TraceRun(scene, self, on_step)
+        clock, run = time.perf_counter(), self.prepared(scene, on_step)
         if isinstance(self.start, Branch):
             run.go_on(self.start)
             return run
-        if isinstance(self.start, SpecialPoint) and self.start.kind == "branch_point":
-            point = run.switched(self.start)
-        else:
-            state = _first_state(run.potential, self.start)
-            state_resolution.refuse_unresolved(run.potential, state)
-            point = first_point(run.potential, state, self.direction)
+        point = run.first(self.start)
         run.timings["setup"] = time.perf_counter() - clock
         run.set_out(point, clock)
         return run
 
+    def prepared(self, scene: Scene, on_step: OnStep | None) -> TraceRun:
+        """The run before it has a start."""
+        return TraceRun(scene, self, on_step)
+
     def go_on(self, scene: Scene, unfinished: Branch, on_step: OnStep | None = None) -> TraceRun:
-        run = TraceRun(scene, replace(self, start=unfinished, direction=1), on_step)
+        run = replace(self, start=unfinished, direction=1).prepared(scene, on_step)
         run.go_on(unfinished)
         run.made = run.regular - 1
         run.timings |= unfinished.timings
@@ -148,7 +147,7 @@ def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     return point.equilibrium
 
 
-def _first_state(potential: Potential, start: Start) -> State:
+def first_state(potential: Potential, start: Start) -> State:
     """The state at a volume, or of an equilibrium, from which a trace sets out."""
     if isinstance(start, SpecialPoint):
         start = _of_this_branch(start)
@@ -171,7 +170,7 @@ class TraceRun(Run[Branch]):
 
     Attributes
     ----------
-    problem : BranchProblem
+    problem : CurveProblem
         The equations of the branch.
     tracer : Tracer
         The length of the next step, and the memory that predicts it.
@@ -187,10 +186,11 @@ class TraceRun(Run[Branch]):
         Changes of inertia at which no special point was located.
     """
 
+    problem: CurveProblem[Any]
     point: BranchPoint
 
-    def __init__(self, scene: Scene, request: TraceRequest, on_step: OnStep | None = None) -> None:
-        super().__init__(scene, potential_of(scene), ("setup", "solve", "special_points", "verdicts"))
+    def __init__(self, scene: Scene, request: TraceRequest, on_step: OnStep | None = None, potential: Potential | None = None) -> None:
+        super().__init__(scene, potential or potential_of(scene), ("setup", "solve", "special_points", "verdicts"))
         if "center_height" in request.targets:
             check_height("until.center_height", self.potential)
         self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
@@ -202,6 +202,14 @@ class TraceRun(Run[Branch]):
         self._crossing: Crossing | None = None
 
     # --- where it sets out
+
+    def first(self, start: Start) -> BranchPoint:
+        """The first point, of whatever start but a branch."""
+        if isinstance(start, SpecialPoint) and start.kind == "branch_point":
+            return self.switched(start)
+        state = first_state(self.potential, start)
+        state_resolution.refuse_unresolved(self.potential, state)
+        return first_point(self.potential, state, self.request.direction)
 
     def set_out(self, point: BranchPoint, clock: float) -> None:
         """Stand at the first point of a branch, on which work began at a time."""
@@ -220,7 +228,7 @@ class TraceRun(Run[Branch]):
 
     def go_on(self, start: Branch) -> None:
         """Stand at the last regular step of a trace of this scene."""
-        if self.request.direction != 1 or potential_of(start.scene) is not self.potential:
+        if self.request.direction != 1 or not self.continues(start):
             raise InputError("start", "a Branch", "a branch of this scene is allowed, to be continued the way it was going (direction=1)")
         memory = start.memory
         if not isinstance(memory, TraceMemory):
@@ -228,14 +236,25 @@ class TraceRun(Run[Branch]):
                 "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
             )
         self.tracer.path, self.tracer.step, self.tracer.known = predictor_of(memory), memory.step, memory.known
-        state = restore(self.potential, start[memory.regular - 1])
-        self.point = oriented_point(self.potential, state, memory.sigma[-1], memory.slopes[-1])
+        self.point = self.restored(start[memory.regular - 1], memory)
         # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
-        self.found = [eq.in_scene(self.scene) for eq in start[: memory.regular]]
+        self.found = [eq.in_scene(self.same(eq.scene)) for eq in start[: memory.regular]]
         self.special = None
         if start.special_points is not None:
-            self.special = [replace(p, equilibrium=p.equilibrium.in_scene(self.scene)) for p in start.special_points]
+            self.special = [replace(p, equilibrium=p.equilibrium.in_scene(self.same(p.equilibrium.scene))) for p in start.special_points]
         self.regular, self.unexplained = memory.regular, list(memory.unexplained)
+
+    def continues(self, start: Branch) -> bool:
+        """Whether a branch may be continued: it is one of this scene."""
+        return not start.over and potential_of(start.scene) is self.potential
+
+    def restored(self, last: Equilibrium, memory: TraceMemory) -> BranchPoint:
+        """The point of the last step."""
+        return oriented_point(self.potential, restore(self.potential, last), memory.sigma[-1], memory.slopes[-1])
+
+    def same(self, scene: Scene) -> Scene:
+        """A scene of the branch that is continued, with the analyses of this one."""
+        return self.scene
 
     # --- how it is stepped
 
@@ -246,7 +265,7 @@ class TraceRun(Run[Branch]):
         try:
             return self._step()
         except SolveError as error:
-            near = self.potential.distance_to_sources(self.point.state.x)
+            near = self.potential_at(self.point).distance_to_sources(self.point.state.x)
             return stopped_by_source(error, near, self.potential.space.unit) or (error.status, str(error))
 
     def _all_made(self) -> End:
@@ -268,42 +287,62 @@ class TraceRun(Run[Branch]):
         with self.timed("solve"):
             new = next(self._points)
         segment = Segment(self.problem, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
-        met = [point for q, v in self.request.targets.items() for point in segment.crossings(q, v)]
+        met = [point for q, v in self.request.targets.items() for point in segment.crossings(self.quantity(q), v)]
         last = min(met, key=lambda p: p.sigma, default=None)
-        if unresolved := state_resolution.unresolved(self.potential, (last or new).state):
-            return Status.NOT_RESOLVED, f"at {self._place(last or new)} {unresolved}"
+        if unresolved := state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state)):
+            return Status.NOT_RESOLVED, f"at {self.place(last or new)} {unresolved}"
         closing = self._look_for_special_points(segment, last)
         last = closing or last
         self._add(last or new, clock)
         self._look_for_onsets(segment, last or new)
         if closing is not None:
-            return Status.CLOSED, f"the branch came back to the branch point V = {closing.state.volume:.6g} at which it set out"
-        if last is not None and not wellposed.unresolved_source(self.potential, last.state.x):
+            return Status.CLOSED, f"the branch came back to {self.origin(closing)} at which it set out"
+        if last is not None and not wellposed.unresolved_source(self.potential_at(last), last.state.x):
             return self._explained(Status.CONVERGED, "")
         self.point, self.regular = new, len(self.found)
-        return self._ill_posed(new) or self._at_source(new)
+        return self._ill_posed(new) or self._at_source(new) or self.at_bound(new)
+
+    def quantity(self, name: str) -> str:
+        """The quantity of the curve that a target names."""
+        return name
+
+    def potential_at(self, point: BranchPoint) -> Potential:
+        """The potential of the scene of a point."""
+        return self.potential
+
+    def origin(self, point: BranchPoint) -> str:
+        """Where a closed branch set out, in words."""
+        return f"the branch point V = {point.state.volume:.6g}"
+
+    def at_bound(self, point: BranchPoint) -> End | None:
+        """The end at a point beyond which there is no scene."""
+        return None
 
     def _ill_posed(self, point: BranchPoint) -> End | None:
-        bad = wellposed.ill_posed(self.potential, point.state.evaluation) if self.request.ill_posed == "stop" else None
+        if self.request.ill_posed != "stop":
+            return None
+        bad = wellposed.ill_posed(self.potential_at(point), self.own(point.state).evaluation)
         if bad is None:
             return None
-        return bad.status, f"at {self._place(point)} {bad}, and what a mesh finds beyond depends on the mesh"
+        return bad.status, f"at {self.place(point)} {bad}, and what a mesh finds beyond depends on the mesh"
 
     def _at_source(self, point: BranchPoint) -> End | None:
-        state = point.state
-        if unresolved := wellposed.unresolved_source(self.potential, state.x):
+        state, potential = point.state, self.potential_at(point)
+        if unresolved := wellposed.unresolved_source(potential, state.x):
             return Status.DIPOLE_CONTACT, f"{unresolved} (V = {state.volume:.6g})"
-        if touching := touches_source(self.potential.distance_to_sources(state.x), self.potential.space.unit):
+        if touching := touches_source(potential.distance_to_sources(state.x), potential.space.unit):
             return Status.DIPOLE_CONTACT, f"{touching} at V = {state.volume:.6g}"
         return None
 
-    def _place(self, point: BranchPoint) -> str:
+    def place(self, point: BranchPoint) -> str:
+        """Where a point is, for messages."""
         height = self.potential.space.center_height(point.state.x)
         return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
 
     def _add(self, point: BranchPoint, clock: float) -> None:
         with self.timed("verdicts"):
-            new = record(self.scene, self.potential, point.state, self.found[-1] if self.found else None, clock)
+            scene, state = self.scene_of(point.state), self.own(point.state)
+            new = record(scene, state.evaluation.potential, state, self.found[-1] if self.found else None, clock)
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.request.max_steps + 1, new)
@@ -315,14 +354,18 @@ class TraceRun(Run[Branch]):
         if self.special is None:
             return None
         with self.timed("special_points"):
-            located = [fold for kind in FOLDS for fold in segment.folds(kind)]
-            crossed = self._crossed(segment)
+            located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
+            crossed = self.crossed(segment)
             for fold in sorted(located + crossed, key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
-            return next((found.point for found in crossed if self._back(found.point, last)), None)
+            return self.closing(segment, crossed, last)
 
-    def _crossed(self, segment: Segment[BranchPoint]) -> list[Located[BranchPoint]]:
+    def closing(self, segment: Segment[Any], crossed: Sequence[Located[Any]], last: BranchPoint | None) -> BranchPoint | None:
+        """The point at which the branch comes back to where it set out, if it does so before the end of the trace."""
+        return next((found.point for found in crossed if self._back(found.point, last)), None)
+
+    def crossed(self, segment: Segment[BranchPoint]) -> list[Located[BranchPoint]]:
         """The branch points on a segment; that one is missing is noted."""
         number = branches_crossing(segment)
         crossed = branch_points(segment) if number else []
@@ -348,16 +391,16 @@ class TraceRun(Run[Branch]):
             if verdict.smallest_eigenvalue * after.verdict(azimuthal=n).smallest_eigenvalue < 0:  # False where either is NaN (short-wave)
 
                 def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
-                    return azimuthal_eigenvalue(self.potential, point.state.x, point.state.pressure, n, guess).value
+                    return azimuthal_eigenvalue(self.potential_at(point), point.state.x, point.state.pressure, n, guess).value
 
                 with self.timed("special_points"):
                     self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))
 
     def _special(self, fold: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
-        return special_point(self.scene, self.potential, fold, azimuthal)
+        return special_point(self, self.scene_of(fold.point.state), fold, azimuthal)
 
     def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
-        path = remembered(self.tracer.path, self.potential.space.n_free)
+        path = remembered(self.tracer.path, len(self.point.z))
         memory = TraceMemory(
             path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained), self.tracer.known
         )

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Status, unknown_name
-from ..quantities import PLACES, Units, axis_label
+from ..quantities import PLACES, Units, axis_label, key_label
+from ..results.special_point import SpecialPoint
 from .figures import ILL_POSED_WORD, PLAIN, RED, Style, style_of
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from ..results.branch import Branch
     from ..results.equilibrium import Equilibrium
-    from ..results.special_point import SpecialPoint
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ MARKERS = {
     "limit_point": ("o", "limit point (dP = 0)"),
     "volume_fold": ("s", "volume fold (dV = 0)"),
     "height_fold": ("^", "height fold"),
+    "number_fold": ("h", "limit point in the number"),
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
 }
@@ -59,7 +60,7 @@ def draw_branch(
     axes : matplotlib Axes
     branch : Branch
     across, up : {"volume", "pressure", "center_height"}
-        What the axes show.
+        What the axes show; of a branch over a number also that, by its name.
     units : {"scaled", "si"}
         In units of the package, or in SI units such as ml and kPa, by the scales of the scene; numbers on the axes are those of the label.
     style : Style, optional
@@ -75,12 +76,12 @@ def draw_branch(
         For an unknown quantity or word, and for SI units of a scene without scales.
     """
     for key, name in (("across", across), ("up", up)):
-        if name not in PLACES:
-            raise unknown_name(key, name, PLACES)
+        if name not in (*PLACES, branch.over):
+            raise unknown_name(key, name, [*PLACES, *([branch.over] if branch.over else [])])
     of_scene = Units.of(units, branch.scene.scales)
-    axes.set_xlabel(axis_label(across, of_scene))
-    axes.set_ylabel(axis_label(up, of_scene))
-    shown = _Shown((across, up), np.array([of_scene.factor(across), of_scene.factor(up)]))
+    axes.set_xlabel(_label(across, of_scene))
+    axes.set_ylabel(_label(up, of_scene))
+    shown = _Shown((across, up), np.array([_factor(across, of_scene), _factor(up, of_scene)]))
     axes.grid(color="0.9", linewidth=0.6)
     points = shown.at(branch)
     gaps = _gaps(branch, shown)
@@ -122,8 +123,29 @@ def _words(branch: Branch, controls: Sequence[str]) -> list[dict[Any, str]]:
     return words
 
 
+def answer(branch: Branch) -> str:
+    """The quantity that a branch is drawn by: the pressure, or the height of the pole where a pressure is held."""
+    return "center_height" if "pressure" in branch.hold else "pressure"
+
+
 def _coordinates(items: Sequence[Equilibrium | SpecialPoint], quantities: Sequence[str]) -> Array:
-    return np.array([[getattr(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
+    return np.array([[_value(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
+
+
+def _value(item: Equilibrium | SpecialPoint, quantity: str) -> float:
+    if "." not in quantity:
+        return float(getattr(item, quantity))
+    return (item.equilibrium if isinstance(item, SpecialPoint) else item).number(quantity)
+
+
+def _label(name: str, units: Units) -> str:
+    """The text at an axis that shows a quantity, or a number of the scene, which is shown as the scene has it."""
+    return key_label(name) if "." in name else axis_label(name, units)
+
+
+def _factor(name: str, units: Units) -> float:
+    """What a quantity is multiplied by in these units; a number of the scene stays as it is."""
+    return 1.0 if "." in name else units.factor(name)
 
 
 #: the special points between two neighbouring equilibria, in order: the verdicts that can change there (None: any) and their places in
@@ -132,12 +154,13 @@ _Gap = list[tuple[tuple[Any, ...] | None, Array]]
 _SNAP = ("snap",)
 
 
-def _changes(point: SpecialPoint) -> tuple[Any, ...] | None:
-    """The verdicts that can change at a special point, by control or number of waves."""
+def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:
+    """The verdicts that can change at a special point, by control or number of waves. Over a number what is held decides."""
     of_kind: dict[str, tuple[Any, ...]] = {
-        "limit_point": ("pressure",),
-        "volume_fold": ("volume",),
+        "limit_point": () if branch.over else ("pressure",),
+        "volume_fold": () if branch.over else ("volume",),
         "height_fold": (),
+        "number_fold": tuple(branch.hold),
         "azimuthal_onset": (point.azimuthal,),
     }
     return of_kind.get(str(point.kind))
@@ -149,17 +172,18 @@ def _gaps(branch: Branch, shown: _Shown) -> list[_Gap]:
     A special point lies between the two neighbours for which the way over it is the smallest detour, in volume, pressure and pole height
     together (in a picture of two of them the branch may cross itself); one that is far from the points shown lies between none.
     """
-    points, special = _coordinates(branch, PLACES), list(branch.special_points or ())
+    known = (*PLACES, branch.over) if branch.over else PLACES
+    points, special = _coordinates(branch, known), list(branch.special_points or ())
     scale = np.maximum(np.ptp(points, axis=0), 1e-300) if len(points) else 1.0
     a, b = points[:-1] / scale, points[1:] / scale
     direct = np.linalg.norm(b - a, axis=1)
     inside: list[list[tuple[float, SpecialPoint, Array]]] = [[] for _ in direct]
-    places, pictured = _coordinates(special, PLACES) / scale, shown.at(special)
+    places, pictured = _coordinates(special, known) / scale, shown.at(special)
     for item, place, drawn in zip(special, places, pictured, strict=True):
         detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
         if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
             inside[k].append((float((place - a[k]) @ (b[k] - a[k])), item, drawn))
-    ordered: list[_Gap] = [[(_changes(item), drawn) for _, item, drawn in sorted(gap, key=lambda g: g[0])] for gap in inside]
+    ordered: list[_Gap] = [[(_changes(branch, item), drawn) for _, item, drawn in sorted(gap, key=lambda g: g[0])] for gap in inside]
     for jump in branch.jumps:
         for k, (before, landing) in enumerate(pairwise(branch)):
             if landing is jump.landing:  # by way of the fold where the branch turned back

@@ -46,8 +46,8 @@ UNSTABLE = Style("unstable under both controls", DOTTED, BLACK, 2.2)
 #: compressed or slack along the meridian: what a mesh finds there depends on the mesh, stable or not
 ILL_POSED = Style("ill-posed (compressed or slack)", DOTTED, "#888888", 1.2)
 #: when one control alone was asked for
-STABLE_UNDER = {c: Style(f"stable under {c} control", SOLID, BLUE) for c in ("pressure", "volume")}
-UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) for c in ("pressure", "volume")}
+STABLE_UNDER = {c: Style(f"stable under {c} control", SOLID, BLUE) for c in ("pressure", "volume", "gas")}
+UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) for c in ("pressure", "volume", "gas")}
 
 #: the order of the lines in a legend
 _ORDER = [s.label for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED)]
@@ -68,8 +68,9 @@ def style_of(words: Mapping[str, str]) -> Style:
         return ILL_POSED
     if "marginal" in words.values():
         return MARGINAL
-    if len(words) == 1:
-        ((control, word),) = words.items()
+    if not {"pressure", "volume"} <= words.keys():  # of one control alone; beside another one of the gas
+        control = "gas" if "gas" in words else next(iter(words))
+        word = words[control]
         return (STABLE_UNDER if word == "stable" else UNSTABLE_UNDER)[control]
     return UNSTABLE if words["volume"] == "unstable" else BOTH if words["pressure"] == "stable" else VOLUME_ONLY
 

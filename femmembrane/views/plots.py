@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quantities import Units, axis_label, caption
-from .branch_lines import MARKERS, draw_branch
+from .branch_lines import MARKERS, answer, draw_branch
 from .figures import (
     BOTH,
     MARGINAL,
@@ -45,6 +45,7 @@ __all__ = [
     "UNSTABLE",
     "VOLUME_ONLY",
     "Style",
+    "answer",
     "draw_branch",
     "draw_legend",
     "draw_profile",
@@ -61,7 +62,9 @@ __all__ = [
 
 
 def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None, *, units: str = "scaled") -> Figure:
-    """Pressure against volume; line styles tell the verdicts that the scene asked for, markers the special points found.
+    """Pressure against volume, or over a number what answers to it.
+
+    Line styles tell the verdicts that the scene asked for, markers the special points found.
 
     Parameters
     ----------
@@ -79,7 +82,7 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     """
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.6), title=branch.scene.title)
-    draw_branch(axes, branch, units=units)
+    draw_branch(axes, branch, across=branch.over or "volume", up=answer(branch), units=units)
     draw_legend(axes, "among axisymmetric shapes:" if branch.scene.analysis.stability else None)
     return save_figure(figure, path)
 

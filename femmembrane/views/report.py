@@ -150,12 +150,15 @@ class _Page:
         return f"<figure>\n{svg}{about}</figure>"
 
     def _branch(self) -> str:
-        figures = []
-        for across in ("volume", "center_height"):
+        up = plots.answer(self.branch)
+        figures, drawn = [], [(name, "pressure") for name in ("volume", "center_height")]
+        if self.branch.over:
+            drawn = [(self.branch.over, up), ("volume", "pressure" if up != "pressure" else "center_height")]
+        for across, up in drawn:
             figure, axes = plots.new_figure((_WIDTH, _HEIGHT + 0.6))
-            plots.draw_branch(axes, self.branch, across=across, units=self.system)
+            plots.draw_branch(axes, self.branch, across=across, up=up, units=self.system)
             _legend_below(figure, axes)
-            figures.append(self._figure(figure, f"Pressure against {words(across)}"))
+            figures.append(self._figure(figure, f"{words(up).capitalize()} against {words(across)}"))
         return _beside(*figures) + self._special_points() + self._jumps()
 
     def _special_points(self) -> str:
@@ -164,16 +167,17 @@ class _Page:
             return ""
         if not points:
             return "<p>Searched for special points: there are none.</p>"
-        names = {kind: name for kind, (_, name) in plots.MARKERS.items()}
+        names, over = {kind: name for kind, (_, name) in plots.MARKERS.items()}, [self.branch.over] if self.branch.over else []
         rows = [
             [
                 names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
+                *(p.equilibrium.number(name) for name in over),
                 *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
-        return table(["special point", *(heading_in(name, self.units) for name in PLACES), "relative error"], rows)
+        return table(["special point", *over, *(heading_in(name, self.units) for name in PLACES), "relative error"], rows)
 
     def _jumps(self) -> str:
         names, rows = ("volume", "pressure"), []

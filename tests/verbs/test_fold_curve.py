@@ -368,3 +368,13 @@ def test_steps_can_be_chosen():
     coarse = fold_curve(start.equilibrium.scene, **arguments, steps=StepControl(largest=0.5, deviation=2e-3))
     assert len(coarse) < len(magnetic())
     assert coarse.pressure[-1] == pytest.approx(magnetic().pressure[-1], rel=1e-9)
+
+
+def test_verdicts_along_a_curve_are_those_of_each_points_own_scene():
+    start = folds(above(elements=16), "limit_point")[2]
+    asked = start.equilibrium.scene.replace(analysis=fm.Analysis(azimuthal_modes=(1,)))
+    end = fold_curve(asked, start=start, parameter=STRENGTH, bounds=(50.0, 400.0)).equilibria[-1]
+    alone = fm.equilibrium(end.scene.replace(analysis=fm.Analysis()), volume=end.volume, start=end, solver="newton")
+    assert end.number(STRENGTH) == 400.0
+    expected = alone.verdict(azimuthal=1).smallest_eigenvalue
+    assert end.verdict(azimuthal=1).smallest_eigenvalue == pytest.approx(expected, rel=1e-9)

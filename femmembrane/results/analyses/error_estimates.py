@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...quantities import PLACES
 from ..error_estimate import ESTIMATED, ErrorEstimate, from_numbers
 from .base import Array, Cell, Curves, EquilibriumAnalysis, Section, Table, Variable
 
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 def held_by(scene: Scene) -> str:
     """What is held while errors are estimated: what the scene's [run] prescribes; the volume with arc length and without a run."""
-    return (scene.run.quantity if scene.run is not None else None) or "volume"
+    if scene.run is None:
+        return "volume"
+    held = scene.run.quantity if scene.run.hold is None else next(iter(scene.run.hold))
+    return held if held in PLACES else "volume"
 
 
 class ErrorEstimates(EquilibriumAnalysis):

@@ -43,7 +43,9 @@ class Verdicts(EquilibriumAnalysis):
         potential, state = evaluation.potential, (equilibrium.state, equilibrium.pressure, evaluation)
         for p in equilibrium.scene.analysis.verdicts:
             guess = None if before is None else _verdict(before, p).coefficients
-            ask = partial(door.checked_verdict, potential, *state, p.control, p.azimuthal, guess=guess)
+            enclosed = equilibrium.enclosed if p.control == "gas" else None
+            compliance = enclosed.compliance(equilibrium.volume) if enclosed else None
+            ask = partial(door.checked_verdict, potential, *state, p.control, p.azimuthal, guess=guess, compliance=compliance)
             equilibrium.remembered(("verdict", p.control, p.azimuthal), ask)
 
     # --- tables

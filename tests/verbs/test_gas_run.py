@@ -1,0 +1,86 @@
+"""Gas in scene files and runs: amounts as loads, chamber and atmosphere as numbers, verdicts, columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import femmembrane as fm
+from femmembrane.errors import InputError
+from tests.cases import OGDEN, disc_scene
+
+CHAMBER = fm.Chamber(volume=1.0, atmosphere=0.5)
+
+
+def scene(**more: object) -> fm.Scene:
+    return fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), chamber=CHAMBER, **more)  # type: ignore[arg-type]
+
+
+def test_amounts_of_gas_are_loads(tmp_path: Path) -> None:
+    """(P + atmosphere)(V + chamber) = N at each load, and the verdict is that of the membrane stiffened by the gas."""
+    asked = scene(run=fm.Run(control="gas", start=1.0, stop=8.0, steps=4), analysis=fm.Analysis(stability=("pressure", "gas")))
+    branch = fm.run(asked)
+    np.testing.assert_allclose(branch.column("gas"), asked.run.loads() if asked.run else (), rtol=1e-12)
+    np.testing.assert_allclose((branch.column("pressure") + 0.5) * (branch.column("volume") + 1.0), branch.column("gas"), rtol=1e-12)
+    for eq in branch:
+        gas = fm.Gas(CHAMBER.amount(eq.pressure, eq.volume), 1.0, 0.5)
+        assert eq.verdict("gas").smallest_eigenvalue == pytest.approx(eq.verdict("gas", gas=gas).smallest_eigenvalue, rel=1e-9)
+    assert (branch.column("lambda_gas") > branch.column("lambda_pressure")).all()
+    branch.save(tmp_path / "branch.nc")
+    again = fm.load(tmp_path / "branch.nc")
+    for name in ("gas", "lambda_gas", "verdict_gas"):
+        assert (again.column(name) == branch.column(name)).all()
+    assert again.scene == asked
+    assert "under gas" in str(branch)
+    (axes,) = branch.plot().axes
+    assert "stable under gas control" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+@pytest.mark.parametrize("number", ["chamber.volume", "chamber.atmosphere"])
+def test_the_chamber_is_a_number(number: str) -> None:
+    values = [0.4, 1.0, 1.5]
+    branch = fm.vary(scene(), number, values, hold={"gas": 4.0})
+    traced = fm.trace(scene(), over=number, hold={"gas": 4.0}, until={number: 1.5})
+    for eq in [*branch, *traced]:
+        chamber = eq.scene.chamber
+        assert chamber is not None
+        assert chamber.amount(eq.pressure, eq.volume) == pytest.approx(4.0, rel=1e-10)
+        assert branch.over == number
+    for eq, value in zip(branch, values, strict=True):
+        assert eq.number(number) == value
+        gas = fm.Gas(4.0, eq.number("chamber.volume"), eq.number("chamber.atmosphere"))
+        assert fm.equilibrium(scene(), gas=gas).volume == pytest.approx(eq.volume, rel=1e-9)
+    assert traced[-1].volume == pytest.approx(branch[-1].volume, rel=1e-9)
+
+
+def test_gas_holds_while_a_magnet_comes() -> None:
+    magnetic = scene(sources=[fm.Dipole(strength=20.0, height=4.0)], susceptibility=1.0)
+    branch = fm.vary(magnetic, "source.0.height", [4.0, 3.0, 2.5], hold={"gas": 1.0})
+    np.testing.assert_allclose(branch.column("gas"), 1.0, rtol=1e-11)
+    assert (np.diff(branch.column("volume")) > 0).all()
+
+
+def test_a_scene_file_has_a_chamber(tmp_path: Path) -> None:
+    asked = scene(run=fm.Run(control="chamber.volume", hold={"gas": 4.0}, values=(1.0, 2.0)))
+    asked.to_toml(tmp_path / "scene.toml")
+    assert "[chamber]" in (tmp_path / "scene.toml").read_text(encoding="utf-8")
+    assert fm.Scene.from_toml(tmp_path / "scene.toml") == asked
+    assert fm.run(asked).column("chamber.volume").tolist() == [1.0, 2.0]
+
+
+def test_what_is_refused() -> None:
+    bare = scene().replace(chamber=None)
+    with pytest.raises(InputError, match=r"chamber.*missing"):
+        bare.replace(run=fm.Run(control="gas", values=(1.0,)))
+    with pytest.raises(InputError, match=r"chamber.*missing"):
+        bare.replace(analysis=fm.Analysis(stability=("gas",)))
+    with pytest.raises(InputError, match="no chamber of gas"):
+        fm.vary(disc_scene(OGDEN, (20.0, 4.0), elements=8), "source.0.height", [4.0], hold={"gas": 1.0})
+    with pytest.raises(InputError, match=r"hold\.gas"):
+        fm.vary(scene(), "chamber.volume", [1.0], hold={"gas": -1.0})
+    with pytest.raises(InputError, match=r"chamber\.volume"):
+        fm.Chamber(volume=0.0)
+    with pytest.raises(InputError, match=r"chamber\.volume"):
+        fm.vary(scene(), "chamber.volume", [1.0, -1.0], hold={"gas": 1.0})

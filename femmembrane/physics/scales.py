@@ -164,7 +164,7 @@ class Scales:
         InputError
             For an unknown quantity, a value that is no number or too large for a float in SI units, or a negative dipole strength.
         """
-        given = _values(quantity, value)
+        given = _values(quantity, value, value)
         with np.errstate(over="ignore"):
             return _converted(value, given, (np.sqrt(given) if quantity in SQUARED else given) * self._unit(quantity))
 
@@ -195,10 +195,8 @@ class Scales:
             For an unknown quantity, a value that is no number or too large for a float without its unit, a unit of another kind, or a
             negative moment (the sense of a moment is the orientation of its dipole).
         """
-        if has_unit(value):
-            _check_quantity(quantity)
-            value = in_unit("value", value, SI_UNITS[quantity])[0]
-        given = _values(quantity, value)
+        _check_quantity(quantity)
+        given = _values(quantity, value, in_unit("value", value, SI_UNITS[quantity])[0] if has_unit(value) else value)
         with np.errstate(over="ignore"):
             ratio = given / self._unit(quantity)
             return _converted(value, given, ratio * ratio if quantity in SQUARED else ratio)
@@ -246,10 +244,11 @@ def _check_quantity(quantity: Any) -> None:
     choice("quantity", quantity, SI_UNITS)
 
 
-def _values(quantity: str, value: Any) -> Array:
+def _values(quantity: str, value: Any, measured: Any) -> Array:
+    """Numbers as an array; ``value`` is what the user wrote, for errors."""
     _check_quantity(quantity)
     try:
-        array = np.asarray(value)
+        array = np.asarray(measured)
     except ValueError:  # rows of different lengths
         raise InputError("value", value, "a number or an array of numbers is allowed") from None
     if array.dtype.kind not in "iuf":

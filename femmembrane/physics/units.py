@@ -9,6 +9,7 @@ Special Publication 811 (2008), appendix B.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from decimal import Decimal, localcontext
@@ -114,7 +115,10 @@ def in_unit(key: str, text: str, *allowed: str) -> tuple[float, str]:
         factor, dimension = _unit(key, text, found[2])
         for unit in allowed:
             if _unit(key, text, unit)[1] == dimension:
-                return float(Decimal(found[1]) * factor), unit
+                number = float(Decimal(found[1]) * factor)
+                if math.isinf(number):
+                    raise InputError(key, text, f"{examples} is allowed, which a float can hold in {unit}")
+                return number, unit
     raise InputError(key, text, f"{examples} is allowed")
 
 

@@ -91,11 +91,11 @@ def _with_scales(tables: dict[str, Any], si: bool) -> dict[str, Any]:
     if not isinstance(tables.get("material"), Mapping) or not isinstance(scales, Mapping):
         return changed
     changed["material"], shear_modulus = without_moduli(tables["material"], scales.get("shear_modulus"), si)
-    if shear_modulus is None:
+    if shear_modulus is None or ("scales" not in tables and "name" in tables["material"]):  # a real material needs no scales
         return changed
     asked = scales.get("shear_modulus", shear_modulus)
     if is_number(asked) and not math.isclose(asked, shear_modulus, rel_tol=AGREEMENT):
-        advice = f"the moduli of [material] make a shear modulus of {shear_modulus:.12g} Pa; leave it out, or let them agree"
+        advice = f"[material] has a shear modulus of {shear_modulus:.12g} Pa; leave it out, or let them agree"
         raise InputError("scales.shear_modulus", asked, advice)
     return {**changed, "scales": {"shear_modulus": shear_modulus, **scales}}
 
@@ -133,7 +133,7 @@ class _Laboratory:
             raise InputError(f"scales.{name}", table[name], unknown_name(f"scales.{name}", name, names).allowed)
         missing = [name for name in ("radius", "thickness", "shear_modulus") if name not in table]
         if missing:
-            more = "; the shear modulus follows where [material] has its moduli in Pa" if missing[-1] == "shear_modulus" else ""
+            more = "; the shear modulus follows where [material] has its moduli in Pa, or a name" if missing[-1] == "shear_modulus" else ""
             raise InputError(key, value, f"a number in SI units needs [scales], where {', '.join(missing)} is missing{more}")
         return Scales(**table)
 

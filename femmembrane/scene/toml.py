@@ -110,7 +110,7 @@ MAX_BYTES = 2**25
 _OTHERWISE = {
     (Dipole, "strength"): "give it, or scales.dipole_moment in A m^2, from which it follows",
     (Magnet, "strength"): "give it, or the remanence in T beside a table [scales]",
-    (Scales, "shear_modulus"): "give it in Pa, or the moduli of [material] in Pa, from which it follows",
+    (Scales, "shear_modulus"): "give it in Pa, or the moduli of [material] in Pa (or its name), from which it follows",
 }
 #: keys of a table from which an argument of its class follows
 _INSTEAD: dict[Any, tuple[str, ...]] = {Magnet: ("remanence",)}

@@ -24,6 +24,7 @@ from ..physics.chamber import Chamber
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source
 from ..physics.materials import Material
+from ..physics.named import material_data
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
 from .magnetisation import checked_magnetisation, refuse_magnetisation
@@ -98,7 +99,7 @@ class Scene:
     ------
     InputError
         For a value that cannot be used, named by its key in a scene file (``mesh.elements``). For scales that contradict
-        ``radius_to_thickness``, or whose moment no dipole has.
+        ``radius_to_thickness`` or a real material, or whose moment no dipole has.
 
     Examples
     --------
@@ -243,6 +244,7 @@ class Scene:
                 f"no dipole of the scene has its strength, {self.scales.strength:.12g}, so it would do nothing; leave it out, or give a "
                 "dipole this strength (in a scene file: leave the strength of the dipole out)",
             )
+        _check_shear_modulus(self.material, self.scales)
 
     def _check_hubs(self) -> None:
         """Every force on a hub has its hub, and is held."""
@@ -314,9 +316,11 @@ class Scene:
         InputError
             For an unknown table or key (with the nearest valid name), a missing one, or a value that cannot be used.
         """
+        from .given import shown_as_given
         from .laboratory import scaled
 
-        return cls(**scene_arguments(scaled(data), Path(folder)))
+        with shown_as_given(data):
+            return cls(**scene_arguments(scaled(data), Path(folder)))
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> Self:
@@ -378,6 +382,19 @@ def _ratio(key: str, value: Any, scales: Scales | None) -> float:
         advice = "leave radius_to_thickness out, and it follows from the scales (Scene.replace does so when it is given other scales)"
         raise InputError(key, value, f"it contradicts {follows}; {advice}")
     return scales.radius_to_thickness
+
+
+def _check_shear_modulus(material: Any, scales: Any) -> None:
+    """Refuse scales that contradict the shear modulus of a real material."""
+    name, given = getattr(material, "named", None), getattr(scales, "shear_modulus", None)
+    if name is None or given is None:
+        return
+    own = material_data(name).shear_modulus
+    if not math.isclose(given, own, rel_tol=AGREEMENT):
+        advice = (
+            f"{name} has a shear modulus of {own:.12g} Pa; give that, material_data({name!r}).shear_modulus (a scene file may leave it out)"
+        )
+        raise InputError("scales.shear_modulus", given, advice)
 
 
 def _prestretch(key: str, value: Any) -> float:

@@ -201,6 +201,24 @@ def test_numbers_of_the_scene_as_loads(control, value, expected):
             fm.Ogden((0.63 / 0.4225, 0.0012 / 0.4225, -0.01 / 0.4225), (1.3, 5.0, -2.0)),
             422500.0,
         ),
+        # as other programs write it: mu_1 + mu_2 = 0.4 MPa, and 2 mu/alpha = 0.3 and -0.1 MPa
+        (
+            {"model": "ogden", "mu": ["0.3 MPa", "0.1 MPa"], "alpha": [2.0, -2.0], "convention": "2mu/alpha^2"},
+            fm.Ogden((0.75, -0.25), (2.0, -2.0)),
+            4e5,
+        ),
+        ({"model": "polynomial", "c10": "160 kPa", "c01": "40 kPa", "c20": "4 kPa"}, fm.Polynomial(c10=0.4, c01=0.1, c20=0.01), 4e5),
+        ({"model": "lopez-pamies", "mu1": "30 kPa", "mu2": "10 kPa", "alpha1": 1, "alpha2": 3}, fm.LopezPamies(1, 3, 0.25), 4e4),
+        ({"model": "lopez-pamies", "mu1": "30 kPa", "alpha1": 2}, fm.LopezPamies(2), 3e4),
+        ({"model": "gent-gent", "c1": "5 kPa", "c2": "3 kPa", "jm": 50}, fm.GentGent(50, 1 / 6), 1.2e4),
+        (
+            {"model": "extended-tube", "gc": "100 kPa", "ge": "98 kPa", "beta": 0.3, "delta": 0.1},
+            fm.ExtendedTube(0.3, 0.1, 0.5),
+            1.96e5,
+        ),
+        ({"model": "veronda-westmann", "c1": "5 kPa", "b": 2}, fm.VerondaWestmann(2), 1e4),
+        ({"model": "hooke", "young_modulus": "1 MPa", "poisson_ratio": 0.25}, fm.Hooke(0.25), 4e5),
+        ({"model": "hooke", "mu": "1 MPa", "poisson_ratio": 0.25}, fm.Hooke(0.25), 1e6),
     ],
 )
 def test_moduli_by_hand(table, material, shear_modulus):
@@ -216,7 +234,7 @@ def test_moduli_by_hand(table, material, shear_modulus):
 
 def numbers(material):
     parts = [getattr(material, name) for name in material.__dataclass_fields__]
-    return [n for part in parts for n in (part if isinstance(part, tuple) else (part,))]
+    return [n for part in parts if not isinstance(part, str) for n in (part if isinstance(part, tuple) else (part,))]
 
 
 def in_pascals(value):
@@ -225,6 +243,69 @@ def in_pascals(value):
     number, _, unit = value.partition(" ") if isinstance(value, str) else ("", "", "")
     power = {"MPa": "e6", "kPa": "e3", "bar": "e5"}.get(unit)
     return float(number + power) if power else value
+
+
+STRETCHES = (math.log(1.3), math.log(1.1))
+
+
+def invariants():
+    l1, l2 = 1.3**2, 1.1**2
+    l3 = 1 / (l1 * l2)
+    return l1 + l2 + l3 - 3, l1 * l2 + l2 * l3 + l3 * l1
+
+
+@pytest.mark.parametrize(
+    ("table", "energy"),
+    [
+        (
+            {"model": "gent-gent", "c1": 5e3, "c2": 3e3, "jm": 50},  # Pucci and Saccomandi (2002)
+            lambda J, I2: -5e3 * 50 * math.log(1 - J / 50) + 3e3 * math.log(I2 / 3),
+        ),
+        (
+            {"model": "veronda-westmann", "c1": 5e3, "b": 2},  # Veronda and Westmann (1970)
+            lambda J, I2: 5e3 * (math.exp(2 * J) - 1) - 5e3 * 2 / 2 * (I2 - 3),
+        ),
+        (
+            {"model": "lopez-pamies", "mu1": 3e4, "mu2": 1e4, "alpha1": 1, "alpha2": 3},  # Lopez-Pamies (2010)
+            lambda J, I2: 3e4 / 2 * J + 1e4 * 3**-2 / 6 * ((J + 3) ** 3 - 27),
+        ),
+        (
+            {"model": "extended-tube", "gc": 1e5, "ge": 5e4, "beta": 0.3, "delta": 0.1},  # Kaliske and Heinrich (1999)
+            lambda J, I2: (
+                5e4 * (0.99 * J / (1 - 0.01 * J) + math.log(1 - 0.01 * J)) + 1e5 / 0.09 * (1.3**-0.3 + 1.1**-0.3 + (1.3 * 1.1) ** 0.3 - 3)
+            ),
+        ),
+        ({"model": "polynomial", "c10": 1e5, "c01": 2e4, "c11": 5e3}, lambda J, I2: 1e5 * J + (2e4 + 5e3 * J) * (I2 - 3)),
+        (
+            {"model": "ogden", "mu": [3e5, 1e5], "alpha": [2.0, -2.0], "convention": "2mu/alpha^2"},  # 2 mu/4 of I1 - 3 and I2 - 3
+            lambda J, I2: 1.5e5 * J + 0.5e5 * (I2 - 3),
+        ),
+    ],
+)
+def test_energies_in_si_units_are_those_of_the_literature(table, energy):
+    material, shear_modulus = fm.measured(**table)
+    assert shear_modulus * material.energy(*STRETCHES) == pytest.approx(energy(*invariants()), rel=1e-12)
+
+
+def test_youngs_modulus_is_the_slope_of_simple_tension():
+    sheet, mu = fm.measured("hooke", young_modulus=1e6, poisson_ratio=0.3)
+    e = 1e-6
+    across, _ = sheet.natural_width(e)
+    assert mu * sheet.stress(e, across)[0] == pytest.approx(1e6 * e, rel=1e-5)
+
+
+def test_a_real_material_has_its_shear_modulus():
+    sizes = {"radius": "20 mm", "thickness": "0.3 mm"}
+    for units in ("si", "scaled"):
+        found = scene(units=units, material={"name": "vhb-4910"}, scales=sizes)
+        assert (found.scales.shear_modulus, found.material) == (fm.material_data("vhb-4910").shear_modulus, fm.material("vhb-4910"))
+        assert fm.Scene.from_dict(found.to_dict()) == found
+        assert scene(units=units, material={"name": "vhb-4910"}, scales={**sizes, "shear_modulus": "14.62 kPa"}) == found
+        with pytest.raises(InputError, match=r"scales.shear_modulus = '14.6 kPa': .* 14620 Pa"):
+            scene(units=units, material={"name": "vhb-4910"}, scales={**sizes, "shear_modulus": "14.6 kPa"})
+    assert fm.Scene.from_dict({"material": {"name": "vhb-4910"}}).scales is None
+    with pytest.raises(InputError, match=r"scales.shear_modulus = 400000.0: vhb-4910 has a shear modulus of 14620 Pa"):
+        fm.Scene(fm.material("vhb-4910"), scales=fm.Scales(0.02, 3e-4, 4e5))
 
 
 def test_si_moduli_may_come_from_the_scales():
@@ -249,6 +330,18 @@ def test_si_moduli_may_come_from_the_scales():
         ({"model": "ogden", "mu": ["-0.4 MPa"], "alpha": [2]}, "material.mu", "shear modulus, > 0 in Pa"),
         ({"model": "ogden", "mu": ["0.4 MPa", "1 Pa"], "alpha": [2]}, "material.alpha", "as many exponents"),
         ({"model": "gent", "mu": "0.4 MPa"}, "material.jm", "missing"),
+        ({"model": "mooney-rivlin", "c01": "3 MPa", "ratio": 1.0}, "material.ratio", "leave one out"),
+        ({"model": "mooney-rivlin", "c10": "3 MPa", "c01": [1.0]}, "material.c01", "a finite number in Pa"),
+        ({"model": "polynomial", "c10": ["3 MPa"]}, "material.c10", "a finite number in Pa"),
+        ({"model": "polynomial", "c20": "3 MPa"}, "material.c10", "sum of c10 and c01"),
+        ({"model": "lopez-pamies", "mu1": "3 kPa", "share": 0.1, "alpha1": 1}, "material.share", "leave one out"),
+        ({"model": "lopez-pamies", "mu2": "3 kPa", "alpha1": 1}, "material.mu1", "missing"),
+        ({"model": "gent-gent", "c1": "3 kPa", "c2": "-1 kPa", "jm": 9}, "material.c2", "a modulus >= 0"),
+        ({"model": "gent-gent", "c1": "3 kPa", "mu": "1 kPa", "jm": 9}, "material.c1", "leave one out"),
+        ({"model": "extended-tube", "gc": "3 kPa", "beta": 0.3}, "material.delta", "missing"),
+        ({"model": "veronda-westmann", "c1": "3 kPa", "b": "2 kPa"}, "material.b", "number"),
+        ({"model": "hooke", "young_modulus": "3 kPa", "poisson_ratio": -1}, "material.poisson_ratio", "above -1"),
+        ({"name": "vhb"}, "material.name", "did you mean 'vhb-4910'"),
     ],
 )
 def test_moduli_that_are_refused(table, key, text):
@@ -314,9 +407,48 @@ def test_numbers_that_are_refused(tables, key, text):
     assert text in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("tables", "start"),
+    [
+        ({"mesh": {"shape": "annulus", "elements": 4, "inner_radius": "50 mm"}}, "mesh.inner_radius = '50 mm': a number between 0 and 1"),
+        ({"mesh": {"shape": "annulus", "elements": 4, "inner_radius": 0.05}}, "mesh.inner_radius = 0.05: a number between 0 and 1"),
+        ({"mesh": {"shape": "disc", "radii": ["0 m", "12 mm", "9 mm", "2 cm"]}}, "mesh.radii[2] = '9 mm'"),
+        ({"source": [{"kind": "loop", "strength": 1, "height": 1, "radius": "-5 mm"}]}, "source.radius = '-5 mm'"),
+        (
+            {"source": [{"kind": "uniform", "strength": 1}, {"kind": "dipole", "strength": 1, "height": "0 mm"}]},
+            "source[1].height = '0 mm'",
+        ),
+        ({"source": [{"kind": "wire", "strength": "-3 A"}]}, "source.strength = '-3 A'"),
+        ({"load": [{"kind": "hub-force", "force": "3e90 N"}]}, "load.force = '3e90 N'"),
+        ({"run": {"control": "pressure", "values": ["1 kPa", "3e90 kPa"]}}, "run.values[1] = '3e90 kPa'"),
+        ({"membrane": {"thickness": "-0.1 mm"}}, "membrane.thickness = '-0.1 mm'"),
+        ({"material": {"model": "yeoh", "c1": "0.2 MPa", "c2": "-4 kPa"}}, "material.c2 = '-4 kPa'"),
+        ({"material": {"model": "neo-hookean", "mu": "-3 MPa"}}, "material.mu = '-3 MPa'"),
+        ({"scales": {**SCALES, "radius": "-3 mm"}}, "scales.radius = '-3 mm'"),
+    ],
+)
+def test_errors_show_what_the_user_wrote(tables, start):
+    with pytest.raises(InputError) as caught:
+        scene(**{"membrane": {"susceptibility": 1.0}, **tables})
+    assert str(caught.value).startswith(start)
+    assert "(converted: " in str(caught.value)
+
+
+def test_errors_about_numbers_of_the_package_stay_as_they_are():
+    with pytest.raises(InputError) as caught:
+        scene(membrane={"prestretch": -1.0})
+    assert "converted" not in str(caught.value)
+    with pytest.raises(InputError, match=r"material.c2 = '-4 kPa'"):
+        fm.measured("yeoh", c1="0.2 MPa", c2="-4 kPa")
+    with pytest.raises(InputError, match=r"value = '-3 A m\^2'"):
+        fm.Scales(**SCALES).from_si("dipole_strength", "-3 A m^2")
+    with pytest.raises(InputError, match=r"value = '3e999 m': .*float"):
+        fm.Scales(**SCALES).from_si("length", "3e999 m")
+
+
 def test_a_number_with_a_unit_needs_scales():
     bare = {"material": {"model": "neo-hookean"}, "run": {"control": "pressure", "values": ["5 kPa"]}}
-    with pytest.raises(InputError, match=r"run.values\[0\] = 5000.0: a number in SI units needs \[scales\], where radius, thickness"):
+    with pytest.raises(InputError, match=r"run.values\[0\] = '5 kPa': a number in SI units needs \[scales\], where radius, thickness"):
         fm.Scene.from_dict(bare)
     with pytest.raises(InputError, match=r'material.mu = 400000.0: its unit is missing: "0.4 MPa"'):
         fm.Scene.from_dict({"material": {"model": "neo-hookean", "mu": 4e5}})

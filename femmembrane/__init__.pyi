@@ -20,6 +20,7 @@ from .errors import FemmembraneError as FemmembraneError
 from .errors import InputError as InputError
 from .errors import SolveError as SolveError
 from .errors import Status as Status
+from .physics.electric import Electric as Electric
 from .physics.invariant import ArrudaBoyce as ArrudaBoyce
 from .physics.invariant import Fung as Fung
 from .physics.invariant import Gent as Gent

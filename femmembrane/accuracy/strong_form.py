@@ -30,6 +30,7 @@ from ..discretization.meridian import Disc
 from ..errors import InputError
 from ..physics.loads import over_projection, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density
+from ..physics.response import response_of, squared
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -69,7 +70,11 @@ class StrongForm:
                 raise InputError(f"membrane.{key}", getattr(scene, key).given, "an even sheet is allowed here")
         if not isinstance(scene.mesh, Disc):
             raise InputError("mesh.shape", getattr(scene.mesh, "shape", scene.mesh), "the disc is allowed")
-        self.material = scene.material
+        electric = scene.electricity
+        if electric is not None and (electric.total_charge is not None or electric.ends):
+            allowed = "a voltage or a frozen charge on the whole membrane is allowed: the equations here are local and smooth"
+            raise InputError(f"electric.{electric.load}", getattr(electric, electric.load), allowed)
+        self.material = response_of(scene, None if electric is None else squared(electric))
         self.susceptibility = scene.susceptibility or 0.0
         self.sources = acting_sources(scene.sources, self.susceptibility)
         self.loads = tuple(load for load in scene.loads if load.acts)

@@ -21,6 +21,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from .materials import Material
 
 
@@ -37,6 +39,14 @@ class TensionField:
     """
 
     material: Material
+
+    def natural(self, e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
+        """See :func:`natural_strains`."""
+        return natural_strains(e1, e2)
+
+    def beyond(self, e1: Any, e2: Any) -> tuple[Any, Any]:
+        """Strains beyond natural width, (g_1, g_2): they have the signs that decide where the membrane is taut."""
+        return e1 + np.maximum(e2, 0) / 2, e2 + np.maximum(e1, 0) / 2
 
     def energy(self, e1: Any, e2: Any) -> Any:
         n1, n2, _, _ = natural_strains(e1, e2)
@@ -63,8 +73,3 @@ def natural_strains(e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
     least1, least2 = -0.5 * (e2 > 0) * e2, -0.5 * (e1 > 0) * e1
     taut1, taut2 = e1 >= least1, e2 >= least2
     return taut1 * e1 + (1 - taut1) * least1, taut2 * e2 + (1 - taut2) * least2, taut1, taut2
-
-
-def strain_energy(material: Material, tension_field: bool) -> Material:
-    """The strain energy that a membrane follows: the material's own, or its relaxation."""
-    return TensionField(material) if tension_field else material

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ..kernels.interface import Array
+from ..physics.response import squared
 from ..threads import cached_property
 from .expressions import BUILDING, casadi_answers_numpy
 from .potential import Potential, require_elements
@@ -52,11 +53,17 @@ class Family(Potential):
         number = ca.SX.sym("number")
         with casadi_answers_numpy():
             super().__init__(vary(number), quadrature)
+        self._vary = vary
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
         self.terms = {name: ca.substitute(self.terms[name], old, new) for name in names}
+
+    def square(self, x: Array, factor: float = 1.0) -> float | None:
+        if self.electric is None:
+            return None
+        return float(squared(self._vary(factor).electricity))
 
     @cached_property
     @BUILDING

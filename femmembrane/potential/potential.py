@@ -18,10 +18,11 @@ from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
 from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
+from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
+from ..physics.response import local_square, response_columns, response_of, squared
 from ..physics.sheet import Sheet
-from ..physics.tension_field import strain_energy
 from ..threads import cached_property
 from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .replay import PointProgram, Replay, at_points
@@ -136,8 +137,13 @@ class Evaluation:
         return self.potential.load_energy(self.x, self.factor)
 
     @property
+    def electric_energy(self) -> float:
+        """Energy of voltage or charge at x, with the 2 pi; computed when asked for."""
+        return self.potential.electric_energy(self.x, self.factor)
+
+    @property
     def energy(self) -> float:
-        return self.elastic_energy + self.magnetic_energy + self.load_energy
+        return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
 
 
 class Potential:
@@ -162,6 +168,7 @@ class Potential:
         )
         space = self.space
         self.sheet = Sheet.of(scene)
+        self.electric = scene.electricity
         if not space.n_free:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
@@ -184,6 +191,7 @@ class Potential:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
         if self.sheet is not None:
             columns |= self.sheet.columns(space.R, space.Z, space.s)
+        columns |= response_columns(scene, space.R, space.Z, space.s)
         if space.lift is not None:
             columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
@@ -195,12 +203,20 @@ class Potential:
     @property
     def surrounded(self) -> bool:
         """Whether anything but the pressure acts on the membrane. Otherwise the flat unloaded state is an equilibrium without stiffness."""
-        return bool(self.sources or self.loads)
+        return bool(self.sources or self.loads or self.electric)
 
-    @property
-    def material(self) -> Material:
-        """The strain energy of the membrane: the scene's material, or its tension field."""
-        return strain_energy(self.scene.material, self.scene.tension_field)
+    def square(self, x: Array, factor: float = 1.0) -> float | None:
+        """phi^2, or the frozen q^2, of a state; None without voltage and charge. ``factor`` as in :meth:`evaluate`."""
+        return None if self.electric is None else factor * float(squared(self.electric))
+
+    def local_square(self, x: Array, R: Array, Z: Array, s: Array, factor: float = 1.0) -> Array | None:
+        """See :func:`.response.local_square`; of the state x."""
+        found: Array | None = local_square(self.scene, R, Z, s, self.square(x, factor))
+        return found
+
+    def response_at(self, x: Array, R: Array, Z: Array, s: Array, factor: float = 1.0) -> Material:
+        """How the membrane answers strains at points of the meridian in the state x: per thickness, in units of the local modulus."""
+        return response_of(self.scene, self.local_square(x, R, Z, s, factor))
 
     @cached_property
     def bulk(self) -> Array:
@@ -277,6 +293,39 @@ class Potential:
     def _load_kernel(self) -> Replay:
         return Replay(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
 
+    def electric_energy(self, x: Array, factor: float = 1.0) -> float:
+        """Energy of voltage or charge at the free coefficients x, with the 2 pi; 0 without. ``factor`` as in :meth:`evaluate`."""
+        if self.electric is None:
+            return 0.0
+        return float(self._electric_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+
+    def electric_quantities(self, x: Array) -> dict[str, float]:
+        """Voltage, charge, capacitance and the largest true field of a state; zeros without voltage and charge, and NaN for what a frozen
+        charge does not have.
+        """
+        names = ("voltage", "charge", "capacitance", "electric_field")
+        if self.electric is None:
+            return dict.fromkeys(names, 0.0)
+        space, sheet = self.space, self.sheet
+        displacement = space.displacement_at_quadrature(x)
+        u, u_x, _, w_x = displacement
+        e1, e2 = hencky_strains(space.R, space.R_x, space.Z_x, u, u_x, w_x)
+        response: Any = self.response_at(x, space.R, space.Z, space.s)
+        thickness, modulus = (1.0, 1.0) if sheet is None else sheet.factors(space.R, space.Z, space.s)
+        square = response.field_squared(e1, e2) * modulus
+        largest = float(np.sqrt(square.max()))
+        if self.electric.frozen_charge is not None:
+            covered = float((space.area_weights * self.electric.covers(space.s)).sum())
+            return dict(zip(names, (np.nan, self.electric.frozen_charge * covered, np.nan, largest), strict=True))
+        phi = math.sqrt(self.square(x) or 0.0)
+        capacitance = float((space.area_weights * thickness * square).sum()) / phi**2
+        return dict(zip(names, (phi, phi * capacitance, capacitance, largest), strict=True))
+
+    @cached_property
+    @BUILDING
+    def _electric_kernel(self) -> Replay:
+        return Replay(ca.Function("electric", list(self.symbols), [self.terms["electric"]], {"cse": True}), self.point_data)
+
     @cached_property
     def _circles(self) -> tuple[Any, ...]:
         return tuple(circle for source in self.sources for circle in source.circles)
@@ -320,22 +369,29 @@ class Potential:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
         return evaluation.force_scale(pressure)
 
-    def response(self, e1: Array, e2: Array) -> Array:
-        """Principal mechanical stresses and their derivatives with respect to the Hencky strains, where the modulus is 1.
+    def response(self, e1: Array, e2: Array, square: Array | None = None) -> Array:
+        """Principal stresses that the energy feels and their derivatives with respect to the Hencky strains, where the modulus is 1.
+
+        Parameters
+        ----------
+        e1, e2 : ndarray
+        square : ndarray, optional
+            :meth:`local_square` at the points, with voltage or charge.
 
         Returns
         -------
         ndarray, shape (5, n)
             s_1, s_2, ds_1/de_1, ds_1/de_2, ds_2/de_2 in units of mu.
         """
-        return at_points(self._response_function, e1, e2)
+        return at_points(self._response_function, e1, e2, *([] if square is None else [square]))
 
     @cached_property
     @BUILDING
     def _response_function(self) -> ca.Function:
-        e = ca.SX.sym("e", 2)
+        e = ca.SX.sym("e", 2 if self.electric is None else 3)
         with casadi_answers_numpy():
-            stress, tangent = response_expressions(self.material, e)
+            response = response_of(self.scene, None if self.electric is None else e[2])
+            stress, tangent = response_expressions(response, e)
         return point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
 
     def field_energy(self, rho: Array, eta: Array) -> Array:
@@ -371,7 +427,8 @@ def potential_of(scene: Scene) -> Potential:
         While the mesh of the scene is still to be chosen.
     """
     require_elements(scene)
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
+    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": scene.electricity}
+    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain))
 
 
 def require_elements(scene: Scene) -> None:

@@ -64,6 +64,8 @@ class Equilibrium:
         The enclosed gas that holds it, when found under gas control.
     load_energy : float
         Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without loads.
+    electric_energy : float
+        Energy of a voltage (with what its source gives) or of a charge, in the same units; 0 without.
 
     Examples
     --------
@@ -89,12 +91,43 @@ class Equilibrium:
     seconds: float = field(default=0.0, repr=False)
     gas: Gas | None = field(default=None, repr=False)
     load_energy: float = field(default=0.0, repr=False)
+    electric_energy: float = field(default=0.0, repr=False)
     _answers: dict[Key, Any] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
-        """Elastic, magnetic and load energy."""
-        return self.elastic_energy + self.magnetic_energy + self.load_energy
+        """Elastic, magnetic, load and electric energy."""
+        return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
+
+    @property
+    def voltage(self) -> float:
+        """phi between the electrodes, the scene's own or Q/C; 0 without, and NaN with a frozen charge, where there is not one voltage."""
+        return self._electric["voltage"]
+
+    @property
+    def charge(self) -> float:
+        """Q on the electrodes over R0^2 sqrt(eps mu); 0 without."""
+        return self._electric["charge"]
+
+    @property
+    def capacitance(self) -> float:
+        """C = Int (lambda_1 lambda_2)^2/t dA of the electrodes over eps R0^2/T, with the 2 pi; 0 without, NaN with a frozen charge."""
+        return self._electric["capacitance"]
+
+    @property
+    def electric_field(self) -> float:
+        """Largest true field at the quadrature points over sqrt(mu/eps); 0 without."""
+        return self._electric["electric_field"]
+
+    @property
+    def breakdown_ratio(self) -> float:
+        """Largest true field over the breakdown field; NaN where the scene gives none."""
+        electricity = self.scene.electricity
+        return np.nan if electricity is None or electricity.breakdown is None else self.electric_field / electricity.breakdown
+
+    @property
+    def _electric(self) -> dict[str, float]:
+        return self.remembered(("electric",), lambda: self.potential.electric_quantities(self.state))
 
     @property
     def potential(self) -> Potential:

@@ -20,6 +20,7 @@ from ..discretization.supports import as_support, floats
 from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
 from ..physics.along import Along
+from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source, distance_to_polyline
 from ..physics.materials import Material
@@ -77,6 +78,8 @@ class Scene:
     prestretch : float
         How far the membrane is stretched before anything else acts: the rim of a flat disc or annulus is held at so many times its radius,
         the ends of a tube at so many times their height. P, V and lengths stay in units of the reference R0.
+    electric : Electric, optional
+        A voltage or a charge on the faces of the membrane. Without one nothing electric is built.
 
     Raises
     ------
@@ -112,6 +115,7 @@ class Scene:
     thickness: Any = None
     modulus: Any = None
     prestretch: float = 1.0
+    electric: Electric | None = None
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -128,6 +132,10 @@ class Scene:
                 load,
                 ("over_reference", "over_projection", "on_hubs", "sees", "acts"),
                 "a load is allowed, such as Weight(weight=...)",
+            )
+        if self.electric is not None:
+            _check_interface(
+                "electric", self.electric, ("voltage", "plain", "covers"), "an Electric is allowed, such as Electric(voltage=0.3)"
             )
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _check_interface("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
@@ -146,6 +154,7 @@ class Scene:
         )
         self._check_size()
         self._check_sheet()
+        self._check_electric()
         lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
         self._check_sources()
         self._check_hubs()
@@ -174,6 +183,12 @@ class Scene:
             factor = getattr(self, key)
             if factor is not None:
                 factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
+
+    def _check_electric(self) -> None:
+        if self.electric is not None:
+            self.electric.plain(self.scales)  # refuses units without scales
+            ends = self.mesh.breakpoints()
+            self.electric.check(float(ends[0]), float(ends[-1]))
 
     def _check_sources(self) -> None:
         R, Z = self.mesh.position(self.mesh.breakpoints())
@@ -217,8 +232,24 @@ class Scene:
 
     @property
     def element_ends(self) -> tuple[float, ...]:
-        """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet."""
-        return tuple(sorted({s for factor in (self.thickness, self.modulus) if factor is not None for s in factor.ends}))
+        """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet, and ends of electrodes."""
+        places = {s for part in (self.thickness, self.modulus, self.electricity) if part is not None for s in part.ends}
+        return tuple(sorted(places))
+
+    @property
+    def electricity(self) -> Electric | None:
+        """Voltage or charge without units; None where there is none, or its number is 0."""
+        if self.electric is None:
+            return None
+        plain = self.electric.plain(self.scales)
+        if not getattr(plain, plain.load):
+            return None
+        if not plain.ends:
+            return plain
+        ends = self.mesh.breakpoints()[[0, -1]]
+        return dataclasses.replace(
+            plain, start=None if plain.start == ends[0] else plain.start, stop=None if plain.stop == ends[1] else plain.stop
+        )
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.

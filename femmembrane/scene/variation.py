@@ -3,6 +3,7 @@
 ======================== ==================================================================================================
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
+``electric.NAME``        what is given of ``electric.voltage``, ``electric.total_charge`` and ``electric.frozen_charge``
 ``membrane.susceptibility``  chi
 ``material.NAME``        a number of a material that has such an argument
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
@@ -68,6 +69,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return float(self.scene.susceptibility or 0.0)
+        if part == "electric":
+            return float(getattr(self.scene.electric, rest))
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
         owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
@@ -87,6 +90,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return self.scene.replace(susceptibility=value)
+        if part == "electric":
+            return self.scene.replace(electric=dataclasses.replace(self.scene.electric, **{rest: value}))  # type: ignore[type-var]
         if part == "material":
             material: Any = self.scene.material
             if rest.startswith("mu."):
@@ -109,8 +114,12 @@ class Parameter:
         material: Any = scene.material
         sources: tuple[Any, ...] = scene.sources
         loads: tuple[Any, ...] = scene.loads
-        susceptibility = scene.susceptibility
-        if part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
+        susceptibility, electricity = scene.susceptibility, scene.electricity
+        if part == "electric":
+            given: Any = scene.electric
+            unit = 1.0 if given.relative_permittivity is None else given.units(scene.scales)[rest]
+            electricity = _unchecked(dataclasses.replace(given, **{rest: 1.0}).plain(scene.scales), **{rest: value / unit})
+        elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
             sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
         elif rest.startswith("alpha."):
             material = _with_exponent(material, int(rest[6:]), value)
@@ -125,7 +134,7 @@ class Parameter:
                 _Scaled(_unchecked(s, strength=1.0), value) if name == "strength" else _unchecked(s, **{name: value}) for s in sources
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
-        parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
+        parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility, "electricity": electricity}
         kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
         return SimpleNamespace(**parts, **{name: getattr(scene, name) for name in kept})
 
@@ -154,6 +163,8 @@ def names(scene: Scene) -> list[str]:
     """Names of all numbers of a scene that can be varied."""
     found = [f"source.{k}.{name}" for k, source in enumerate(scene.sources) for name in _numbers(source)]
     found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
+    if scene.electric is not None:
+        found.append(f"electric.{scene.electric.load}")
     if scene.sources:
         found.append("membrane.susceptibility")
     material = scene.material

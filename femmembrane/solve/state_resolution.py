@@ -118,9 +118,9 @@ def _pull_at_edges(potential: Potential, state: State) -> dict[float, float]:
         if space.on_axis[k] or "u" in support.held or potential.sources:
             continue
         end = space.ends[[-k]]
-        (R, _), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
+        (R, Z), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
         u, u_s, _, w_s = space.displacement(state.x, end)
-        stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+        stress, _ = potential.response_at(state.x, R, Z, end, state.evaluation.factor).stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
         level = float((np.abs(R_s + u_s) / np.hypot(R_s + u_s, Z_s + w_s))[0])
         left[float(R[0])] = abs(float(stress[0])) * level / float(np.abs(state.evaluation.stress).max() or 1.0)
     return left

@@ -91,7 +91,7 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
     r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
     if slack:
-        r = np.append(r, _folds(potential, evaluation.x, scale))
+        r = np.append(r, _folds(potential, evaluation, scale))
     return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
 
 
@@ -132,13 +132,13 @@ def _plain(stress: Array) -> bool:
     return bool((high < low - high).any())
 
 
-def _folds(potential: Potential, x: Array, scale: float) -> Array:
+def _folds(potential: Potential, evaluation: Evaluation, scale: float) -> Array:
     """Reference radii where two elements meet at so sharp an angle that a smooth meridian between them would be slack."""
     space = potential.space
     s = space.ends[1:-1]
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
-    u, u_s, _, w_s = space.at_inner_ends(x)
-    stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+    u, u_s, _, w_s = space.at_inner_ends(evaluation.x)
+    stress, _ = potential.response_at(evaluation.x, R, Z, s, evaluation.factor).stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
     if potential.sheet is not None:
         stress = stress * potential.sheet.factors(R, Z, s)[1]
     return R[unsupported(stress, scale, True)]

@@ -9,13 +9,17 @@ from numpy.typing import NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
 from ..discretization.space import space_of_scene
+from ..physics.electric_wrinkles import ElectricTensionField
+from ..physics.electrified import Electrified
 from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
+from ..physics.response import response_of
 from ..physics.scales import Scales
 from ..physics.sheet import Sheet
 from ..physics.stress import total_stress
-from ..physics.tension_field import strain_energy
+from ..physics.tension_field import TensionField
+from ..potential import potential_of
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -37,6 +41,12 @@ class Profile:
         Hencky strains (e_1, e_2).
     mechanical, total : (ndarray, ndarray)
         Principal Cauchy stresses in units of mu (:mod:`~femmembrane.physics.stress`).
+    effective : (ndarray, ndarray)
+        What the energy feels: the mechanical stresses, less that of Maxwell under a voltage or a charge.
+    beyond : (ndarray, ndarray) or None
+        In a tension field the strains beyond natural width.
+    field : ndarray or None
+        With voltage or charge the true electric field in units of sqrt(mu/eps).
     """
 
     r: Array
@@ -46,6 +56,9 @@ class Profile:
     strain: tuple[Array, Array]
     mechanical: tuple[Array, Array]
     total: tuple[Array, Array]
+    effective: tuple[Array, Array]
+    beyond: tuple[Array, Array] | None = None
+    field: Array | None = None
 
     def columns(self, scales: Scales | None = None) -> dict[str, Array]:
         """The profile by the names of its columns, with stretches in place of strains, and the stresses in Pa too if there are scales."""
@@ -60,6 +73,7 @@ class Profile:
             "mechanical_stress_2": self.mechanical[1],
             "total_stress_1": self.total[0],
             "total_stress_2": self.total[1],
+            **({} if self.field is None else {"electric_field": self.field}),
         }
         if scales is not None:
             columns |= {f"{name}_pa": scales.to_si("stress", columns[name]) for name in list(columns) if "stress" in name}
@@ -90,13 +104,19 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
     e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
     rho, eta = R + u, Z + w
-    mechanical = strain_energy(scene.material, scene.tension_field).stress(e1, e2)
+    response = response_of(scene, None if scene.electricity is None else potential_of(scene).local_square(x, R, Z, s))
+    effective = mechanical = response.stress(e1, e2)
+    field = None
+    if isinstance(response, (Electrified, ElectricTensionField)):
+        mechanical, field = response.mechanical_stress(e1, e2), np.sqrt(response.field_squared(e1, e2))
     if (sheet := Sheet.of(scene)) is not None:
         modulus = sheet.factors(R, Z, s)[1]
-        mechanical = (modulus * mechanical[0], modulus * mechanical[1])
+        effective, mechanical = ((modulus * pair[0], modulus * pair[1]) for pair in (effective, mechanical))
+        field = None if field is None else field * np.sqrt(modulus)
+    beyond = response.beyond(e1, e2) if isinstance(response, (TensionField, ElectricTensionField)) else None
     h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
     local = pressure - over_projection(scene.loads, eta)[1]
-    total = total_stress(mechanical, local, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
-    return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total)
+    total = total_stress(effective, local, scene.radius_to_thickness, h, tangent, scene.susceptibility or 0.0)
+    return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total, effective, beyond, field)

@@ -32,7 +32,7 @@ from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
 from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
-from .profile import Profile, profile_at
+from .profile import profile_at
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def _changing(
 def _deciding(scene: Scene, x: Array, pressure: float, criterion: str) -> _Stresses:
     def deciding(s: Array) -> tuple[Array, Array]:
         profile = profile_at(scene, x, pressure, s)
-        return profile.total if criterion == "total" else _mechanical(profile, scene.tension_field)
+        return profile.total if criterion == "total" else profile.beyond or profile.effective
 
     return deciding
 
@@ -164,13 +164,6 @@ def _runs(flags: Sequence[bool]) -> list[tuple[int, int]]:
     starts = [k for k, flag in enumerate(flags) if flag and (k == 0 or not flags[k - 1])]
     stops = [k for k, flag in enumerate(flags) if flag and (k + 1 == len(flags) or not flags[k + 1])]
     return list(zip(starts, stops, strict=True))
-
-
-def _mechanical(profile: Profile, tension_field: bool) -> tuple[Array, Array]:
-    if not tension_field:
-        return profile.mechanical
-    e1, e2 = profile.strain
-    return e1 + np.maximum(e2, 0) / 2, e2 + np.maximum(e1, 0) / 2
 
 
 def _tiles(space: Space, deciding: _Stresses) -> tuple[list[int], Array]:

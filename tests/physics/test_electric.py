@@ -1,0 +1,134 @@
+"""Voltage and charge: closed forms of the sphere and of the flat disc, tables of an independent solver, and laws that hold everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import femmembrane as fm
+from femmembrane.accuracy.shooting import Guess, shoot
+from femmembrane.potential import potential_of
+from tests.cases import OGDEN, effect
+
+DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=6)
+SPHERE = fm.Scene(material=fm.NeoHookean(), mesh=fm.sphere(8), degree=4)
+PHI = np.sqrt(0.1)
+
+
+def under(scene, **electric):
+    return scene.replace(electric=fm.Electric(**electric))
+
+
+def ball(stretch):
+    """Volume of the sphere of that radius."""
+    return 4 * np.pi / 3 * stretch**3
+
+
+@pytest.mark.parametrize("point", effect("voltage_0.1_neo"), ids=lambda p: f"height {p['center_height']:.2f}")
+def test_reference(point):
+    """A spectral Ritz solver by others (data/effects.json)."""
+    eq = fm.equilibrium(under(DISC, voltage=PHI), center_height=point["center_height"])
+    for quantity in ("pressure", "volume", "energy"):
+        assert getattr(eq, quantity) == pytest.approx(point[quantity], rel=2e-9), quantity
+
+
+@pytest.mark.parametrize("point", effect("voltage_0.15_dipole_above"), ids=lambda p: f"height {p['center_height']:.2f}")
+def test_reference_with_a_dipole(point):
+    scene = under(DISC, voltage=np.sqrt(0.15)).replace(material=OGDEN, sources=[fm.Dipole(100, 6.0)], susceptibility=2.5)
+    eq = fm.equilibrium(scene, center_height=point["center_height"])
+    for quantity in ("pressure", "volume", "energy"):
+        assert getattr(eq, quantity) == pytest.approx(point[quantity], rel=1e-9), quantity
+
+
+@pytest.mark.parametrize(
+    ("height", "pressure", "eigenvalues"),
+    [
+        (0.5, 0.698949591, (5.114740428, 11.022444333, 16.819536635)),
+        (1.0, 1.291522161, (4.228757675, 14.074485120, 23.683370590)),
+    ],
+)
+def test_azimuthal_eigenvalues(height, pressure, eigenvalues):
+    """A spectral Galerkin solver with forms of its own, to 2e-8: phi^2 = 0.1, waves n = 1, 2, 3."""
+    eq = fm.equilibrium(under(DISC, voltage=PHI), center_height=height)
+    assert eq.pressure == pytest.approx(pressure, rel=1e-9)
+    assert [eq.verdict(azimuthal=n).smallest_eigenvalue for n in (1, 2, 3)] == pytest.approx(eigenvalues, rel=5e-8)
+
+
+def test_operations():
+    """A scene without voltage has the operations that it had (test_shapes.py); a voltage costs one exponential and what goes with it."""
+    plain = potential_of(DISC).operations
+    assert potential_of(under(DISC, voltage=0.0)) is potential_of(DISC)
+    assert plain < potential_of(under(DISC, voltage=PHI)).operations <= plain + 15
+
+
+@pytest.mark.parametrize("stretch", [1.2, 1.345270266, 1.5])
+@pytest.mark.parametrize("electric", [{"voltage": PHI}, {"frozen_charge": 0.7}], ids=str)
+def test_sphere(stretch, electric):
+    """P = 2 (1/l - l^-7 - phi^2 l); a charge q for each reference area has phi = q/l^4."""
+    eq = fm.equilibrium(under(SPHERE, **electric), volume=ball(stretch))
+    square = 0.1 if "voltage" in electric else 0.49 * stretch**-8
+    assert eq.pressure == pytest.approx(2 * (1 / stretch - stretch**-7 - square * stretch), rel=1e-9)
+    assert eq.electric_field == pytest.approx(np.sqrt(square) * stretch**2, rel=1e-5)
+    capacitance = 4 * np.pi * stretch**4
+    if "frozen_charge" in electric:
+        assert np.isnan(eq.voltage)
+        assert eq.electric_energy == pytest.approx(4 * np.pi * 0.49 / 2 * stretch**-4, rel=1e-9)
+    else:
+        assert (eq.voltage, eq.capacitance) == pytest.approx((np.sqrt(square), capacitance), rel=1e-9)
+        sign = -1 if "voltage" in electric else 1
+        assert eq.electric_energy == pytest.approx(sign * square * capacitance / 2, rel=1e-9)
+    assert eq.charge == pytest.approx(np.sqrt(square) * capacitance, rel=1e-9)
+
+
+def test_limit_and_pear_of_a_sphere():
+    """phi^2 = 0.1: limit point phi^2 = 7 l^-8 - l^-2, onset of the pear at l = (3/phi^2)^(1/8)."""
+    branch = fm.trace(under(SPHERE, voltage=PHI), start=ball(1.2), until={"volume": ball(1.6)})
+    limit = next(point for point in branch.special_points if point.kind == "limit_point")
+    assert (limit.volume, limit.pressure) == pytest.approx((ball(1.345270266), 0.966815462), rel=1e-8)
+    pear = (3 / 0.1) ** (1 / 8)
+    before, after = (
+        fm.equilibrium(under(SPHERE, voltage=PHI), volume=ball(pear * k), solver="newton").verdict("volume") for k in (0.99, 1.01)
+    )
+    assert before.stable is True
+    assert after.stable is False
+    at = fm.equilibrium(under(SPHERE, voltage=PHI), volume=ball(pear), solver="newton")
+    assert at.pressure == pytest.approx(0.899392049, rel=1e-8)
+    assert at.verdict("volume").smallest_eigenvalue == pytest.approx(0, abs=1e-6)
+
+
+def test_fold_of_the_disc():
+    """phi^2 = 0.1: P = 1.313627680 at V = 1.877006, by an independent Ritz solver."""
+    branch = fm.trace(under(DISC, voltage=PHI), start=1.5, until={"volume": 2.2})
+    limit = next(point for point in branch.special_points if point.kind == "limit_point")
+    assert limit.pressure == pytest.approx(1.313627680, rel=1e-9)
+    assert limit.volume == pytest.approx(1.877006, rel=3e-6)
+    assert float(limit.equilibrium.profile([0.0])["stretch_1"][0]) == pytest.approx(1.778048, rel=3e-6)
+
+
+def test_energy_along_a_branch():
+    """dE/dV = P, and at one volume dE/dphi = -Q."""
+    h = 1e-4
+    a, b = (fm.equilibrium(under(DISC, voltage=PHI), volume=1.5 + k * h) for k in (-1, 1))
+    eq = fm.equilibrium(under(DISC, voltage=PHI), volume=1.5)
+    assert (b.energy - a.energy) / (2 * h) == pytest.approx(eq.pressure, rel=1e-7)
+    a, b = (fm.equilibrium(under(DISC, voltage=PHI + k * h), volume=1.5) for k in (-1, 1))
+    assert (b.energy - a.energy) / (2 * h) == pytest.approx(-eq.charge, rel=1e-7)
+    assert eq.charge == pytest.approx(PHI * eq.capacitance, rel=1e-14)
+
+
+@pytest.mark.parametrize("electric", [{"voltage": PHI}, {"frozen_charge": 0.5}], ids=str)
+def test_shooting(electric):
+    """The strong form has the same response: shooting agrees with the elements."""
+    scene = under(DISC, **electric)
+    eq = fm.equilibrium(scene, center_height=0.8)
+    found = shoot(scene, center_height=0.8, guess=Guess.of(eq))
+    assert (found.pressure, found.volume) == pytest.approx((eq.pressure, eq.volume), rel=1e-9)
+
+
+def test_stresses():
+    """Total stress is the mechanical one less the square of the true field; T/R0 = 0 to round-off here."""
+    shape = fm.equilibrium(under(DISC, voltage=PHI).replace(radius_to_thickness=1e30), volume=1.5).profile()
+    square = 0.1 * (shape["stretch_1"] * shape["stretch_2"]) ** 2
+    assert shape["electric_field"] ** 2 == pytest.approx(square, rel=1e-12)
+    for k in ("1", "2"):
+        assert shape[f"total_stress_{k}"] == pytest.approx(shape[f"mechanical_stress_{k}"] - square, abs=1e-12)

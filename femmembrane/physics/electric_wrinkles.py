@@ -11,8 +11,8 @@ d_11 - d_12^2/d_22. For neo-Hookean material m = -e/2 - log(1 - psi^2 exp(2 e))/
 This relaxation is local: the energy of a voltage has no lower bound. A natural width ceases to exist where the voltage pulls a strip wide;
 a slack membrane does above a voltage of its own (phi^2 = 0.4725 for neo-Hookean material). There is no number there: the answers are NaN.
 
-Sources: A. C. Pipkin, IMA J. Appl. Math. 36 (1986), for the relaxation; P. Greaney, M. Meere and G. Zurlo, J. Mech. Phys. Solids 122 (2019),
-for wrinkles of dielectric films.
+Sources: A. C. Pipkin, IMA J. Appl. Math. 36 (1986), for the relaxation; P. Greaney, M. Meere and G. Zurlo, J. Mech. Phys. Solids 122
+(2019), for wrinkles of dielectric films.
 """
 
 from __future__ import annotations

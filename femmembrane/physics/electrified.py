@@ -4,8 +4,8 @@ Per thickness and in units of the local modulus, with the field at rest psi = ph
 
     v = psi^2 J^2,  f = q^2/J^2,     energy W - v/2 + f/2,     stress s_i - v - f,     tangent d_ij - 2 v + 2 f   (11, 12 and 22)
 
-These effective stresses decide what the stresses of the material decide elsewhere: the Legendre-Hadamard condition and wrinkling (Zhao and Suo 2007, for the
-moduli).
+These effective stresses decide what the stresses of the material decide elsewhere: the Legendre-Hadamard condition and wrinkling (Zhao and
+Suo 2007, for the moduli).
 """
 
 from __future__ import annotations

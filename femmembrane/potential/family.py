@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from ..errors import InputError
 from ..kernels.interface import Array
 from ..physics.response import squared
 from ..threads import cached_property
@@ -63,7 +64,10 @@ class Family(Potential):
     def square(self, x: Array, factor: float = 1.0) -> float | None:
         if self.electric is None:
             return None
-        return float(squared(self._vary(factor).electricity))
+        return super().square(x, factor) if self.charged is not None else float(squared(self._vary(factor).electricity))
+
+    def charge_squared(self, factor: float) -> float:
+        return float(self._vary(factor).electricity.total_charge) ** 2
 
     @cached_property
     @BUILDING
@@ -85,11 +89,16 @@ class Family(Potential):
 
     def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
         """Derivative of E' - P V' with respect to the number, shape (n_free,)."""
-        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))
-        return self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+        more = [] if self.charged is None else [self.charged.square(x, number)]
+        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number, *more]))
+        own = self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+        return own if self.charged is None else own + self.charged.number_derivative(x, number)
 
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
+        if self.charged is not None:
+            allowed = "a voltage is allowed, whose folds are local: a total charge couples all points of the membrane"
+            raise InputError("electric.total_charge", self.charged.total, allowed)
         space, ne = self.space, self.space.n_elements
         local = np.concatenate([space.at_quadrature(x), space.at_quadrature(mode)])
         out = self._fold_kernel(local, np.array([pressure, number, q]))

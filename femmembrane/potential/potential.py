@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import casadi as ca
 import numpy as np
@@ -17,17 +17,20 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
+from ..kernels.bordered import BorderedFactor, SpringFactor
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Factor, Step
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import acting_sources, magnetic_energy_density, swept
-from ..physics.response import local_square, response_columns, response_of, squared
+from ..physics.response import ELECTRODE, local_square, response_columns, response_of, squared
 from ..physics.sheet import Sheet
 from ..threads import cached_property
+from .charge import Charged
 from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .replay import PointProgram, Replay, at_points
 
 if TYPE_CHECKING:
+    from ..physics.electric import Electric
     from ..physics.materials import Material
     from ..scene import Scene
 
@@ -44,11 +47,13 @@ class Evaluation:
         Whether all derivatives are numbers: outside the domain of the energy they are not.
     elements : Elements
         The kernels that answered.
+    spring : ndarray, shape (n_free,), or None
+        a, where the second derivatives are the band plus a a^T: with a total charge, which couples all points.
     """
 
     __slots__ = (
         *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
-        *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative", "_known"),
+        *("potential", "elements", "factor", "spring", "_forces", "_densities", "_band", "_negative", "_known"),
     )
 
     def __init__(
@@ -63,9 +68,11 @@ class Evaluation:
         potential: Potential,
         elements: Elements,
         factor: float,
+        spring: Array | None = None,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
         self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
+        self.spring = spring
         self._band: Array | None = None
         self._negative: int | None = None
         self._known: dict[str, float] | None = None
@@ -107,24 +114,42 @@ class Evaluation:
 
     @property
     def band(self) -> Array:
-        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
+        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free), less what the :attr:`spring` adds: assembled when first asked for,
+        as not every state needs it.
+        """
         if self._band is None:
             self._band = self.elements.assemble(self._densities)
         return self._band
 
     @property
     def negative(self) -> int:
-        """Number of negative eigenvalues of :attr:`band`: counted once, as two neighbouring steps of a branch ask for it."""
+        """Number of negative eigenvalues of E'' - P V'': counted once, as two neighbouring steps of a branch ask for it."""
         if self._negative is None:
-            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, None, 0.0)
+            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, self.spring, 1.0)
         return self._negative
+
+    def factors(self) -> Factor:
+        """Factors of E'' - P V''."""
+        factor = kernels().factor(self.band)
+        return factor if self.spring is None else SpringFactor(factor, self.spring)
+
+    def inner(self, x: Array, y: Array) -> float:
+        """x . (E'' - P V'') y."""
+        own = kernels().inner(self.band, self.potential.space.half_bandwidth, x, y)
+        return own if self.spring is None else own + float(self.spring @ x) * float(self.spring @ y)
 
     def border(self, row: Array, corner: float) -> Border:
         """Factors of :attr:`band` with the column -V' and the row of a control."""
+        if self.spring is not None:
+            return BorderedFactor(self.factors(), -self.volume_gradient, row, corner)
         return self.elements.border(self._densities, self.volume_gradient, row, corner)
 
     def step(self, row: Array, corner: float, gap: float) -> Step:
         """The bordered Newton step at x and its factors, see :meth:`.Elements.step`."""
+        if self.spring is not None:
+            border, largest = self.border(row, corner), self.elements.largest
+            dx, dp = border.solve(self.unbalanced, -gap)
+            return border, dx, dp, largest(dx), largest(self.x)
         return self.elements.step(self._densities, self._forces, row, corner, gap, self.x)
 
     def force_scale(self, pressure: float) -> tuple[float, float]:
@@ -207,7 +232,18 @@ class Potential:
 
     def square(self, x: Array, factor: float = 1.0) -> float | None:
         """phi^2, or the frozen q^2, of a state; None without voltage and charge. ``factor`` as in :meth:`evaluate`."""
-        return None if self.electric is None else factor * float(squared(self.electric))
+        if self.electric is None:
+            return None
+        return self.charged.square(x, factor) if self.charged is not None else factor * float(squared(self.electric))
+
+    def charge_squared(self, factor: float) -> float:
+        """Q^2 of a total charge. ``factor`` as in :meth:`evaluate`."""
+        return factor * float(cast("Electric", self.electric).total_charge or 0.0) ** 2
+
+    @cached_property
+    def charged(self) -> Charged | None:
+        """The electrodes with a total charge; None without."""
+        return None if self.electric is None or self.electric.total_charge is None else Charged(self)
 
     def local_square(self, x: Array, R: Array, Z: Array, s: Array, factor: float = 1.0) -> Array | None:
         """See :func:`.response.local_square`; of the state x."""
@@ -217,6 +253,12 @@ class Potential:
     def response_at(self, x: Array, R: Array, Z: Array, s: Array, factor: float = 1.0) -> Material:
         """How the membrane answers strains at points of the meridian in the state x: per thickness, in units of the local modulus."""
         return response_of(self.scene, self.local_square(x, R, Z, s, factor))
+
+    @cached_property
+    def electrode(self) -> Array | None:
+        """The column of that name of :func:`.response_columns` at the quadrature points; None where all points are alike."""
+        space = self.space
+        return response_columns(self.scene, space.R, space.Z, space.s).get(ELECTRODE)
 
     @cached_property
     def bulk(self) -> Array:
@@ -279,14 +321,18 @@ class Potential:
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
-        elements = self.elements
-        return Evaluation(x, *elements.evaluate(np.ascontiguousarray(x, dtype=float), pressure, magnetic), self, elements, magnetic)
+        elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
+        if self.charged is None:
+            return Evaluation(x, *elements.evaluate(x, pressure, magnetic), self, elements, magnetic)
+        square, spring = self.charged.at(x, magnetic)
+        return Evaluation(x, *elements.evaluate(x, pressure, magnetic, square), self, elements, magnetic, spring)
 
     def load_energy(self, x: Array, factor: float = 1.0) -> float:
         """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""
         if not self.loads:
             return 0.0
-        return float(self._load_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+        parameters = np.array([0.0, factor] if self.charged is None else [0.0, factor, 0.0])  # a voltage is no load
+        return float(self._load_kernel(self.space.at_quadrature(x), parameters).sum())
 
     @cached_property
     @BUILDING
@@ -297,7 +343,23 @@ class Potential:
         """Energy of voltage or charge at the free coefficients x, with the 2 pi; 0 without. ``factor`` as in :meth:`evaluate`."""
         if self.electric is None:
             return 0.0
+        if self.charged is not None:
+            return self.charged.energy(x, factor)
         return float(self._electric_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+
+    def _field_squared(self, x: Array, factor: float = 1.0) -> Array:
+        """Square of the true field at the quadrature points."""
+        space, sheet = self.space, self.sheet
+        u, u_x, _, w_x = space.displacement_at_quadrature(x)
+        strains = hencky_strains(space.R, space.R_x, space.Z_x, u, u_x, w_x)
+        response: Any = self.response_at(x, space.R, space.Z, space.s, factor)
+        modulus = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[1]
+        square: Array = response.field_squared(*strains) * modulus
+        return square
+
+    def largest_field(self, x: Array, factor: float = 1.0) -> float:
+        """Largest true field at the quadrature points."""
+        return math.sqrt(float(self._field_squared(x, factor).max()))
 
     def electric_quantities(self, x: Array) -> dict[str, float]:
         """Voltage, charge, capacitance and the largest true field of a state; zeros without voltage and charge, and NaN for what a frozen
@@ -307,12 +369,8 @@ class Potential:
         if self.electric is None:
             return dict.fromkeys(names, 0.0)
         space, sheet = self.space, self.sheet
-        displacement = space.displacement_at_quadrature(x)
-        u, u_x, _, w_x = displacement
-        e1, e2 = hencky_strains(space.R, space.R_x, space.Z_x, u, u_x, w_x)
-        response: Any = self.response_at(x, space.R, space.Z, space.s)
-        thickness, modulus = (1.0, 1.0) if sheet is None else sheet.factors(space.R, space.Z, space.s)
-        square = response.field_squared(e1, e2) * modulus
+        thickness = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[0]
+        square = self._field_squared(x)
         largest = float(np.sqrt(square.max()))
         if self.electric.frozen_charge is not None:
             covered = float((space.area_weights * self.electric.covers(space.s)).sum())

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
-from .banded import negative_directions
+from .banded import negative_among
 from .branch import BranchProblem, first_point
 from .contact import touches_source
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
@@ -494,7 +494,7 @@ def _sound(state: State) -> bool:
 
 def _is_minimum(state: State) -> bool:
     """Whether a state is a minimum under pressure control."""
-    return negative_directions(state.evaluation.band, state.evaluation.potential.space.half_bandwidth) == 0
+    return negative_among(state.evaluation) == 0
 
 
 def _pull(potential: Potential) -> float:

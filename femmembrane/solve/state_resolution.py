@@ -18,7 +18,7 @@ from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
-from .banded import negative_directions
+from .banded import negative_among
 from .branch import first_point
 from .controls import VolumeControl
 from .finer_space import counterpart, met_across, moved, solved_in, transferred
@@ -198,7 +198,7 @@ def _found_again(onto: Potential, potential: Potential, state: State) -> State |
 
 def _side(potential: Potential, evaluation: Evaluation) -> int:
     """Number of negative directions at constant volume: changes at every fold in the volume."""
-    return negative_directions(evaluation.band, potential.space.half_bandwidth, evaluation.volume_gradient)
+    return negative_among(evaluation, evaluation.volume_gradient)
 
 
 def _largest_stretch(potential: Potential, x: Array) -> float:

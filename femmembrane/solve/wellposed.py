@@ -78,9 +78,7 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
 
 def _nearly_slack(evaluation: Evaluation) -> bool:
     """Whether some point has little meridional tension left. A mesh folds before the membrane does, and a coarse mesh first."""
-    return apparent(evaluation.potential, evaluation) is not None or bool(
-        evaluation.stress[0].min() < _LITTLE * np.abs(evaluation.stress).max()
-    )
+    return apparent(evaluation.potential, evaluation) is not None or bool(evaluation.stress[0].min() < _LITTLE * stress_scale(evaluation))
 
 
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
@@ -88,11 +86,22 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     slack = potential.scene.tension_field
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
-    scale = np.abs(evaluation.stress).max(initial=0.0)  # all zero in the flat unloaded membrane, which is not slack but at rest
+    scale = stress_scale(evaluation)  # zero in the flat unloaded membrane, which is not slack but at rest
     r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
     if slack:
         r = np.append(r, _folds(potential, evaluation, scale))
     return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None
+
+
+def stress_scale(evaluation: Evaluation) -> float:
+    """The largest stress of a state; with voltage or charge also that of Maxwell, with which the stress of the material may balance."""
+    return evaluation.once("stress scale", _stress_scale)
+
+
+def _stress_scale(evaluation: Evaluation) -> float:
+    largest = float(np.abs(evaluation.stress).max(initial=0.0))
+    potential = evaluation.potential
+    return largest if potential.electric is None else max(largest, potential.largest_field(evaluation.x, evaluation.factor) ** 2)
 
 
 def _least_meridional(evaluation: Evaluation) -> float:
@@ -112,7 +121,7 @@ def compressed(potential: Potential, evaluation: Evaluation, component: int) -> 
         sure = confirmed(lambda found: least_stress(found.evaluation, component) < 0, potential, evaluation)
     if sure is False:
         return None
-    r = potential.space.R.ravel()[unsupported(stress, np.abs(evaluation.stress).max(), False)]
+    r = potential.space.R.ravel()[unsupported(stress, stress_scale(evaluation), False)]
     return IllPosed(float(r.min()), float(r.max()), False, bool(sure))
 
 
@@ -121,7 +130,7 @@ def least_stress(evaluation: Evaluation, component: int) -> float:
     least = float(evaluation.stress[component].min(initial=0.0))
     if least >= 0:  # the usual case needs no scale
         return 0.0
-    return least if unsupported(np.array(least), np.abs(evaluation.stress).max(), False) else 0.0
+    return least if unsupported(np.array(least), stress_scale(evaluation), False) else 0.0
 
 
 def _plain(stress: Array) -> bool:

@@ -8,6 +8,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.accuracy.shooting import Guess, shoot
 from femmembrane.potential import potential_of
+from femmembrane.solve.banded import band_product
 from tests.cases import OGDEN, effect
 
 DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=6)
@@ -62,7 +63,7 @@ def test_operations():
 
 
 @pytest.mark.parametrize("stretch", [1.2, 1.345270266, 1.5])
-@pytest.mark.parametrize("electric", [{"voltage": PHI}, {"frozen_charge": 0.7}], ids=str)
+@pytest.mark.parametrize("electric", [{"voltage": PHI}, {"frozen_charge": 0.7}, {"total_charge": 0.7 * 4 * np.pi}], ids=str)
 def test_sphere(stretch, electric):
     """P = 2 (1/l - l^-7 - phi^2 l); a charge q for each reference area has phi = q/l^4."""
     eq = fm.equilibrium(under(SPHERE, **electric), volume=ball(stretch))
@@ -132,3 +133,56 @@ def test_stresses():
     assert shape["electric_field"] ** 2 == pytest.approx(square, rel=1e-12)
     for k in ("1", "2"):
         assert shape[f"total_stress_{k}"] == pytest.approx(shape[f"mechanical_stress_{k}"] - square, abs=1e-12)
+
+
+def charged(scene, x, pressure=0.0):
+    """Gradient of E_Q - P V, and the whole of its second derivatives."""
+    evaluation = potential_of(scene).evaluate(x, pressure)
+    kd = potential_of(scene).space.half_bandwidth
+    whole = np.stack([band_product(evaluation.band, kd, column) for column in np.eye(x.size)], axis=1)
+    return -evaluation.unbalanced, whole + np.outer(evaluation.spring, evaluation.spring)
+
+
+@pytest.mark.parametrize("tension_field", [False, True])
+def test_derivatives_of_a_total_charge(tension_field):
+    """By central differences of energy and gradient, at a state that is no equilibrium, wrinkled on the outside."""
+    scene = under(DISC, total_charge=0.8).replace(mesh=fm.disc(3), degree=3, tension_field=tension_field)
+    space = potential_of(scene).space
+    r = space.interpolation_points()
+    x = space.interpolate(-0.35 * r * (1 - r**2), 0.5 * (1 - r**4))
+    gradient, second = charged(scene, x, 0.3)
+    h, direction = 1e-5, np.random.default_rng(1).standard_normal(x.size)
+    a, b = (potential_of(scene).evaluate(x + k * h * direction, 0.3) for k in (1, -1))
+    slope = (a.energy - 0.3 * a.volume - b.energy + 0.3 * b.volume) / (2 * h)
+    assert gradient @ direction == pytest.approx(slope, rel=1e-7)
+    assert second @ direction == pytest.approx((b.unbalanced - a.unbalanced) / (2 * h), rel=1e-5, abs=1e-5)
+
+
+def test_a_total_charge_passes_the_limit_of_the_voltage():
+    """A sphere at P = 0: l^6 = 1 + q^2, whose voltage phi^2 = (l^6 - 1)/l^8 is largest, pull-in, at l^6 = 4."""
+    for q in (0.5, np.sqrt(3), 3.0):
+        eq = fm.equilibrium(under(SPHERE, total_charge=4 * np.pi * q), pressure=0.0)
+        stretch = (1 + q**2) ** (1 / 6)
+        assert eq.volume == pytest.approx(ball(stretch), rel=1e-8)
+        assert eq.voltage**2 == pytest.approx((stretch**6 - 1) / stretch**8, rel=1e-8)
+
+
+@pytest.mark.parametrize("q", [0.8, 3.0])
+def test_held_by_its_charge_or_its_voltage(q):
+    """One equilibrium, whose verdict at a held charge is stable on both sides of the limit point of the voltage."""
+    eq = fm.equilibrium(under(SPHERE, total_charge=4 * np.pi * q), pressure=0.05)
+    assert eq.verdict("pressure").stable
+    found = fm.equilibrium(under(SPHERE, voltage=eq.voltage), volume=eq.volume, solver="newton")
+    assert found.pressure == pytest.approx(0.05, rel=1e-8)
+    assert found.verdict("pressure").stable is (q < 1)
+
+
+def test_verdicts_of_a_charged_sphere():
+    """The breathing mode is the softest of those with l = 0: its eigenvalue is dP/dl l^2 .../..., negative beyond (7 (1 + q^2))^(1/6)."""
+    limit = (7 * 1.49) ** (1 / 6)
+    for electric in ({"total_charge": 0.7 * 4 * np.pi}, {"frozen_charge": 0.7}):
+        branch = fm.trace(under(SPHERE, **electric), start=ball(0.97 * limit), until={"volume": ball(1.03 * limit)})
+        point = next(p for p in branch.special_points if p.kind == "limit_point")
+        assert point.volume == pytest.approx(ball(limit), rel=1e-7)
+        assert [branch[k].verdict("pressure").stable for k in (0, -1)] == [True, False]
+        assert all(branch[k].verdict("volume").stable for k in (0, -1))

@@ -29,7 +29,10 @@ class BorderedFactor:
     def perturb(self) -> None:
         """Make an exactly singular matrix one that is singular to round-off, as inverse iteration does."""
         least = float(np.finfo(float).eps) * max(1.0, abs(self._corner))
-        self._delta_v, self._delta_w = (-least if delta == 0 else delta for delta in (self._delta_v, self._delta_w))
+        if self._delta_v == 0:
+            self._delta_v = self._delta_v - least
+        if self._delta_w == 0:
+            self._delta_w = self._delta_w - least
 
     @property
     def schur(self) -> float:

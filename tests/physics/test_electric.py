@@ -159,22 +159,26 @@ def test_derivatives_of_a_total_charge(tension_field):
 
 
 def test_a_total_charge_passes_the_limit_of_the_voltage():
-    """A sphere at P = 0: l^6 = 1 + q^2, whose voltage phi^2 = (l^6 - 1)/l^8 is largest, pull-in, at l^6 = 4."""
+    """A sphere has l^6 = 1 + q^2 at P = 0, and the largest voltage, pull-in, at q^2 = 3: nothing happens to the charge there."""
     for q in (0.5, np.sqrt(3), 3.0):
-        eq = fm.equilibrium(under(SPHERE, total_charge=4 * np.pi * q), pressure=0.0)
-        stretch = (1 + q**2) ** (1 / 6)
-        assert eq.volume == pytest.approx(ball(stretch), rel=1e-8)
-        assert eq.voltage**2 == pytest.approx((stretch**6 - 1) / stretch**8, rel=1e-8)
+        stretch = 1.001 * (1 + q**2) ** (1 / 6)
+        eq = fm.equilibrium(under(SPHERE, total_charge=4 * np.pi * q), volume=ball(stretch), solver="newton")
+        assert eq.pressure == pytest.approx(2 * (1 / stretch - (1 + q**2) / stretch**7), rel=1e-7)
+        assert eq.voltage == pytest.approx(q / stretch**4, rel=1e-8)
 
 
 @pytest.mark.parametrize("q", [0.8, 3.0])
 def test_held_by_its_charge_or_its_voltage(q):
-    """One equilibrium, whose verdict at a held charge is stable on both sides of the limit point of the voltage."""
-    eq = fm.equilibrium(under(SPHERE, total_charge=4 * np.pi * q), pressure=0.05)
-    assert eq.verdict("pressure").stable
-    found = fm.equilibrium(under(SPHERE, voltage=eq.voltage), volume=eq.volume, solver="newton")
-    assert found.pressure == pytest.approx(0.05, rel=1e-8)
-    assert found.verdict("pressure").stable is (q < 1)
+    """Beyond the limit point of the voltage a held charge takes one negative direction away, breathing; pears stay (q^2 > 3)."""
+    stretch = (1 + q**2) ** (1 / 6) * 1.02
+    eq = fm.equilibrium(under(SPHERE, total_charge=4 * np.pi * q), volume=ball(stretch), solver="newton")
+    other = fm.equilibrium(under(SPHERE, voltage=eq.voltage), volume=eq.volume, solver="newton")
+    assert other.pressure == pytest.approx(eq.pressure, rel=1e-8)
+    counts = [found.potential.evaluate(found.state, found.pressure).negative for found in (eq, other)]
+    assert counts[0] == counts[1] - (q > 1)
+    assert eq.verdict("pressure").stable is (q < 1)
+    # at n = 0 the operator of waves is the same one
+    assert eq.frequencies(count=1)[0].eigenvalue == pytest.approx(eq.verdict("pressure").smallest_eigenvalue, rel=1e-6)
 
 
 def test_verdicts_of_a_charged_sphere():

@@ -32,6 +32,11 @@ class Lift:
     axial: tuple[float, float]
     ends: tuple[float, float]
 
+    @property
+    def rigid(self) -> bool:
+        """Whether it moves the membrane along the axis as a whole, and strains nothing."""
+        return not any(self.radial) and self.axial[0] == self.axial[1]
+
     def at(self, mesh: Meridian, s: Array) -> Array:
         """(u0, u0_s, w0, w0_s) at parameters s, shape (4, *s.shape)."""
         first, last = self.ends

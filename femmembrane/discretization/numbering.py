@@ -40,6 +40,8 @@ class Numbering:
     ----------
     lift : Lift or None
         The displacement that carries the held ends to their places; the unknowns are what there is beside it.
+    strained : bool
+        Whether the places of the ends strain the membrane, so that it is under tension, or compressed, without any load.
     closed : bool
         Whether the last node is the first one.
     size : float
@@ -113,6 +115,7 @@ class Numbering:
         self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
         self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
         self.lift = lift_of(mesh, prestretch)
+        self.strained = self.lift is not None and not self.lift.rigid
         self.radial = bool((self.s == self.R).all())
         self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
         self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
@@ -120,7 +123,10 @@ class Numbering:
         span = float(self.lengths.sum()) / (1 if mesh.supports() else 2 * np.pi)
         self._support(n_nodes)
         self.unit = min(float(mesh.position(self.ends)[0].max()), span)
-        self.slenderness = max(1.0, extent(*mesh.position(self.ends)) / self.unit)
+        if self.strained:  # by the larger of what it is at rest and what it is drawn out to
+            drawn = float(weights @ np.hypot(self.lifted[1], self.lifted[3]) @ np.ones(self.n_elements))
+            self.unit = max(self.unit, min(float(self._lifted_ends[0].max()), drawn))
+        self.slenderness = max(1.0, extent(*self._lifted_ends) / self.unit)
         self._number(self.nodes[local])
         self.points: Array = points[0]
 
@@ -207,6 +213,22 @@ class Numbering:
     def _lifted_ends(self) -> Array:
         """Where the ends of the elements are while all unknowns are zero."""
         return self._end_positions if self.lift is None else self._end_positions + self.lift.at(self.mesh, self.ends)[::2]
+
+    @cached_property
+    def lift_size(self) -> tuple[float, float]:
+        """Largest displacements across and along the axis that the places of the ends make of themselves, without any unknown."""
+        if self.lift is None or not self.strained:
+            return 0.0, 0.0
+        u, _, w, _ = self.lift.at(self.mesh, self.ends)
+        return float(np.abs(u).max()), float(np.abs(w).max())
+
+    @cached_property
+    def lift_mean(self) -> float:
+        """Root mean square over the reference area, in units of the membrane's own size, of the displacements in :attr:`lift_size`."""
+        if self.lift is None or not self.strained:
+            return 0.0
+        u, _, w, _ = self.lift.at(self.mesh, self.s)
+        return float(np.sqrt((self.area_weights * (u**2 + w**2)).sum() / self.reference_area)) / self.unit
 
     @cached_property
     def lifted(self) -> tuple[Array, Array, Array, Array]:

@@ -179,6 +179,11 @@ class Potential:
     scene : Scene
     quadrature : int, optional
         Polynomial degree integrated exactly; default 2 degree + 1.
+
+    Attributes
+    ----------
+    flat : bool
+        Whether the membrane without load is flat and without stress, so that nothing but a load gives it stiffness across its plane.
     """
 
     @BUILDING
@@ -206,9 +211,10 @@ class Potential:
             raise InputError("load", self.loads, advice)
         pulled = any(type(load).on_hubs is not Load.on_hubs for load in self.loads)
         forces = on_hubs(self.loads, [end.rigid for end in space.supports]) if pulled else None
-        self.flat = not (space.Z.any() or space.Z_x.any())
+        level = not (space.Z.any() or space.Z_x.any())
+        self.flat = level and not space.strained
         columns = {"R": space.R, "R_x": space.R_x, "weight": space.weights}
-        if not self.flat:
+        if not level:
             columns |= {"Z": space.Z, "Z_x": space.Z_x}
         if space.wall is not None:
             columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}

@@ -92,7 +92,8 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def rest_between(self, a: BranchPoint, b: BranchPoint) -> BranchPoint | None:
         """The flat membrane at rest, where the points lie on mirror images of one branch."""
-        mirrored = all(a.value(q) * b.value(q) < 0 for q in FOLDS.values())
+        rest = {q: CONTROLS[q].rest(self.potential.space) for q in FOLDS.values()}
+        mirrored = all((a.value(q) - rest[q]) * (b.value(q) - rest[q]) < 0 for q in FOLDS.values())
         if not (mirrored and self.potential.flat and rests_flat(self.potential)):
             return None
         state = flat_state(self.potential)

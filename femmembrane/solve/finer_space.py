@@ -18,7 +18,7 @@ from .branch import BranchProblem, first_point
 from .continuation import BranchPoint
 from .controls import ArcLengthControl, Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, relative_residual
-from .state import State, distance, joined
+from .state import State, displacement, distance, joined
 
 #: change of the membrane, relative to its size, beyond which the state found in the finer space is not taken for the same equilibrium
 FAR = 0.2
@@ -137,5 +137,5 @@ def confirmed(
 
 def moved(onto: Potential, x: Array, before: Array) -> float:
     """Change of a state of a space relative to its size: root mean squares over the reference area."""
-    size, change = distance(onto, x, np.zeros_like(x)), distance(onto, x, before)
+    size, change = displacement(onto, x), distance(onto, x, before)
     return change / size if size else 0.0

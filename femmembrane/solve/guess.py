@@ -56,20 +56,22 @@ def _normal(space: Space) -> Array:
 
 
 def spherical_dome(potential: Potential, volume: float) -> Array:
-    """Coefficients of a spherical cap over the rim that encloses a volume, material points at equal angles.
+    """Coefficients of a spherical cap over the rim that encloses a volume, material points at equal angles; of a rim of radius 1, to
+    which others are similar.
 
     The height H solves pi H (H^2 + 3)/6 = V: with H = 2 sinh t this is sinh 3t = 3 V/pi, exact down to the smallest volumes.
     """
     space = potential.space
     s = space.interpolation_points()
-    height = 2 * np.sinh(np.arcsinh(volume * (3 / np.pi)) / 3)
+    rim = 1.0 if space.lift is None else 1 + space.lift.radial[1]
+    height = 2 * np.sinh(np.arcsinh(volume / rim**3 * (3 / np.pi)) / 3)
     if height == 0:
         return np.zeros(space.n_free)
     radius = (1 + height**2) / (2 * height)
     angle = 2 * np.arctan(height)
     u = radius * (_sine_excess(angle * s) - s * _sine_excess(np.asarray(angle)))  # radius sin(angle s) - s, for radius sin(angle) = 1
     eta = 2 * radius * np.sin(angle * (1 + s) / 2) * np.sin(angle * (1 - s) / 2)
-    return space.interpolate(u, eta)
+    return space.interpolate(rim * u, rim * eta)
 
 
 def _sine_excess(x: Array) -> Array:

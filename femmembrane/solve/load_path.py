@@ -19,7 +19,7 @@ from .start import cold_start, moderate
 from .state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from .state_resolution import refuse_unresolved
 from .stepping import Corrector, march
-from .wellposed import slackness, unresolved_source
+from .wellposed import ill_posed, slackness, unresolved_source
 
 #: who solves, by the public name
 SOLVERS: dict[str, Corrector] = {"ipopt": minimize_and_verify, "newton": correct}
@@ -140,7 +140,8 @@ class LoadPath:
             return self._from_nowhere(load, jump)
         if load == self.load:
             return self._arrived(self.state, load, None)
-        if self.held.odd and self.potential.flat and self.load * load <= 0 and rests_flat(self.potential):
+        rest = self.held.rest(self.potential.space)
+        if self.held.odd and self.potential.flat and (self.load - rest) * (load - rest) <= 0 and rests_flat(self.potential):
             return self._through_flat(self.state, load, jump)
         if at_rest(self.potential, self.held, load):
             self.memory = Predictor()
@@ -198,6 +199,9 @@ class LoadPath:
         ):
             return guess, None  # a limit point at this very pressure, which no corrector finds under pressure control
         if result.status is Status.NOT_A_MINIMUM:
+            if self.potential.space.strained and (bad := ill_posed(self.potential, guess.evaluation)) is not None:
+                where = f"in the state found there (V = {guess.volume:.6g}, P = {guess.pressure:.6g}) {bad}"
+                raise SolveError(where, status=bad.status)
             turn = self._lost(guess, load)
             if jump and turn.limit.landing is not None:
                 return turn.limit.landing, turn
@@ -257,13 +261,14 @@ class LoadPath:
 
         Where loads or sources hold another state in equilibrium at no load, the branch passes there, and is followed as any other.
         """
-        state, turn = self._along(before, NEAR_ZERO * self.load, jump)
+        flat = self.held.rest(self.potential.space)
+        state, turn = self._along(before, flat + NEAR_ZERO * (self.load - flat), jump)
         rest = np.zeros_like(state.x)
         if distance(self.potential, state.x, rest) > NEAR_REST * distance(self.potential, before.x, rest):
             state, later = self._along(state, load, jump)
             return state, later or turn
         self.memory = Predictor()
-        if load == 0:
+        if load == flat:
             self.state, self.load = flat_state(self.potential), load
             return self.state, turn
         state, later = self._along(self._mirrored(state), load, jump)
@@ -273,7 +278,7 @@ class LoadPath:
         """The mirror image of a state at hand, at the opposite load."""
         mirrored = state.x.copy()
         mirrored[self.potential.space.fields[1]] *= -1
-        self.load *= -1
+        self.load = 2 * self.held.rest(self.potential.space) - self.load
         result = self.corrector(self.potential, self.held.at(self.load), mirrored, -state.pressure)
         if result.status is not Status.CONVERGED:
             raise SolveError(f"the state on the other side of the flat membrane was not found at {self.load:.3g}", status=result.status)

@@ -22,8 +22,8 @@ from ..potential.replay import vectorise
 from ..threads import Guard
 from .banded import negative_among
 from .controls import Control, PressureControl, VolumeControl
-from .newton import NewtonResult, correct
-from .state import distance
+from .newton import NewtonResult, correct, displaced
+from .state import displacement, distance
 
 #: two states closer than this are the same, relative to the size of the displacement
 SAME = 1e-6
@@ -74,6 +74,8 @@ def minimize(
     """
     evaluation = evaluation or potential.evaluate(x, pressure, magnetic)
     scale_u, scale_w = (float(np.abs(x[index]).max(initial=0.0)) or 1.0 for index in potential.space.fields)
+    if potential.space.strained:  # stiff in both directions, so that one length measures both
+        scale_u = scale_w = max(displaced(potential, x))
     scales = np.empty_like(x)
     scales[potential.space.fields[0]], scales[potential.space.fields[1]] = scale_u, scale_w
     objective = float(np.abs(scales * evaluation.gradient).max(initial=0.0)) or 1.0
@@ -178,7 +180,7 @@ def _on_branch_of_guess(
     Where the branch is unstable a minimiser may stay on it, or go downhill to another branch: round-off and the mesh decide.
     """
     own = correct(potential, control, x, pressure, magnetic=magnetic)
-    if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * distance(potential, found.x, np.zeros_like(x)):
+    if own.status is not Status.CONVERGED or distance(potential, own.x, found.x) <= SAME * displacement(potential, found.x):
         return found
     return own if distance(potential, own.x, x) < distance(potential, found.x, x) else found
 

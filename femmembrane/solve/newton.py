@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..discretization.space import Space
 from ..errors import Status
 from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
@@ -173,11 +174,12 @@ class Equations:
         """:func:`relative_size` of a correction, without a component that is zero and in balance to round-off."""
         gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
         if self.bordered is None:
-            self.bordered, dx, dp, self._change, self._size = self.evaluation.step(self._row, self._corner, gap)
+            self.bordered, dx, dp, self._change, size = self.evaluation.step(self._row, self._corner, gap)
+            self._size = with_lift(self.potential.space, size)
             return dx, dp
         largest = self.evaluation.elements.largest
         dx, dp = self.bordered.solve(self.evaluation.unbalanced, -gap)
-        self._change, self._size = largest(dx), largest(self.x)
+        self._change, self._size = largest(dx), with_lift(self.potential.space, largest(self.x))
         return dx, dp
 
     def size(self) -> float:
@@ -215,7 +217,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     """Largest step length 1, 1/2, 1/4, ... after which the simplified correction has shrunk."""
     potential, length = equations.potential, 1.0
     # both corrections in the units of the first, which may be larger than the displacement itself
-    units = [max(pair) for pair in zip(potential.largest(equations.x), potential.largest(dx), strict=True)]
+    units = [max(pair) for pair in zip(displaced(potential, equations.x), potential.largest(dx), strict=True)]
     # a component that is zero but for round-off, as along a tube that widens alone, has no size of its own
     units = [unit if unit > NEGLIGIBLE * max(units) else max(units) for unit in units]
     while length > 1e-4:
@@ -233,7 +235,20 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
 
 def relative_size(potential: Potential, dx: Array, x: Array) -> float:
     """Largest change of u and of w, each relative to its own size: on a nearly flat membrane u is of order w^2."""
-    return _relative(potential.largest(dx), potential.largest(x))
+    return _relative(potential.largest(dx), displaced(potential, x))
+
+
+def displaced(potential: Potential, x: Array) -> tuple[float, float]:
+    """Largest displacements u and w of a state, or those that the places of the ends make of themselves where these are larger."""
+    return with_lift(potential.space, potential.largest(x))
+
+
+def with_lift(space: Space, size: tuple[float, float]) -> tuple[float, float]:
+    """Largest unknowns u and w, or the displacements that the places of the ends make where these are larger."""
+    if space.lift is None:
+        return size
+    (u, w), (u0, w0) = size, space.lift_size
+    return max(u, u0), max(w, w0)
 
 
 def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:

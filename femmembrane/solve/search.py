@@ -14,11 +14,11 @@ from .branch import FOLDS, BranchProblem, first_point
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, VolumeControl
 from .guess import guess_at_volume
-from .newton import TOLERANCE, Equations, correct, relative_size
+from .newton import TOLERANCE, Equations, correct, displaced, relative_size
 from .segment import Located, Segment
 from .special_points import branch_points, branches_crossing
 from .start import moderate, start_at_volume
-from .state import Predictor, State, at_rest, distance, flat_state
+from .state import Predictor, State, at_rest, displacement, distance, flat_state
 from .state_resolution import unresolved
 from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest
 from .wellposed import ill_posed, is_slack
@@ -131,7 +131,7 @@ class Search:
         """Whether a state lies between two traced points of nearly the same shape. A start on a known branch is not traced again."""
         reach = 0.5 * (self.potential.space.units["volume"] + abs(state.volume))
         near = [p for p in self._points if abs(p.state.volume - state.volume) < reach]
-        scale = distance(self.potential, state.x, np.zeros_like(state.x))
+        scale = displacement(self.potential, state.x)
         for p in near:
             result = correct(self.potential, VolumeControl(state.volume), p.state.x, p.state.pressure)
             if result.status is Status.CONVERGED and distance(self.potential, result.x, state.x) <= SAME * scale:
@@ -155,7 +155,7 @@ class Search:
         return self.states + self.ill_posed + self.unresolved
 
     def _known(self, x: Array) -> bool:
-        return any(distance(self.potential, x, s.x) <= SAME * distance(self.potential, s.x, 0 * s.x) for s in self._avoided)
+        return any(distance(self.potential, x, s.x) <= SAME * displacement(self.potential, s.x) for s in self._avoided)
 
     def _deflated(self) -> State | None:
         """A state not found yet, by Newton's method with the known ones deflated (Farrell, Birkisson and Funke, 2015)."""
@@ -179,7 +179,7 @@ class Search:
         with suppress(SolveError):
             phi, stiffness = softest(self.potential, state)
             if stiffness < SOFT:
-                size = float(np.abs(state.x).max())
+                size = max(displaced(self.potential, state.x))
                 shapes += [state.x + k * size * phi for k in KICKS]
         return shapes
 
@@ -197,7 +197,7 @@ class Search:
             # the deflated step is the Newton step times 1/(1 - d log(deflation) . dx)
             slope = sum(-2 * self._cosine(x - s.x, dx) for s in self._avoided)
             length = 1 / (1 - slope) if abs(1 - slope) > 1e-12 else 1.0
-            size = distance(potential, x + dx, x) / max(distance(potential, x, 0 * x), 1e-12)
+            size = distance(potential, x + dx, x) / max(displacement(potential, x), 1e-12)
             length = float(np.clip(length, -1.0, 1.0)) * min(1.0, 1.0 / size if size > 0 else 1.0)
             x, pressure = x + length * dx, pressure + length * dp
         return None

@@ -25,14 +25,14 @@ from .banded import negative_among
 from .branch import BranchProblem, first_point
 from .contact import touches_source
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
-from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, VolumeControl
+from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, PressureControl, VolumeControl
 from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize
 from .newton import NEGLIGIBLE, correct
 from .segment import Segment
-from .state import Predictor, State, at_rest, distance, flat_state
+from .state import Predictor, State, at_rest, displacement, distance, flat_state
 from .state_resolution import unresolved
 from .stepping import march
 from .wellposed import ill_posed, is_slack, slackness, unresolved_source
@@ -60,6 +60,35 @@ def moderate(potential: Potential) -> float:
     return max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
 
 
+def unloaded(potential: Potential) -> State | None:
+    """The membrane without pressure, sources and loads, drawn out to where its ends are held.
+
+    None where they are held where they rest, where that state was not found, and where it is compressed: it is no place to start from.
+    """
+    state = _without_load(potential)
+    return state if state is not None and _sound(state) else None
+
+
+def _without_load(potential: Potential) -> State | None:
+    """As :func:`unloaded`, whether it is compressed or not."""
+    if not potential.space.strained or potential.space.loose:
+        return None
+    control, x = PressureControl(0.0), np.zeros(potential.space.n_free)
+    result = correct(potential, control, x, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
+    if result.status is Status.CONVERGED:
+        return State.of(result)
+    return follow_homotopy(Held(potential, control, x, 0.0, magnetic=0.0), x, 0.0)
+
+
+def usual_volume(potential: Potential) -> float:
+    """The volume from which a branch is followed when no other is asked for.
+
+    It is that under tension without load, where the places of the ends stretch the membrane, else that of the moderately inflated one.
+    """
+    drawn = unloaded(potential)
+    return potential.space.reference_volume + moderate(potential) if drawn is None else drawn.volume
+
+
 def cold_start(potential: Potential, held: Controlled, load: float, *, stable: bool = True) -> State:
     """The equilibrium at a load of any control in :data:`.CONTROLS`, or with an amount of gas.
 
@@ -77,6 +106,8 @@ def cold_start(potential: Potential, held: Controlled, load: float, *, stable: b
     SolveError
         When none of the ways arrives.
     """
+    if not potential.surrounded and (state := _without_load(potential)) is not None and state.value_of(held) == load:
+        return state  # under tension as any other; one that is compressed is what there is without load
     if isinstance(held, Gas):
         return start_in_gas(potential, held.at(load))
     if held is CONTROLS["pressure"]:
@@ -159,7 +190,7 @@ def _adrift(state: State) -> bool:
 def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, Way]]:
     rest, size = potential.space.reference_volume, moderate(potential)
     # less a margin: rest + moderate - rest, what is inflated to from here, may be rounded down
-    near = abs(volume - rest) < size * (1 - 1e-12)
+    near = abs(volume - rest) < size * (1 - 1e-12) and unloaded(potential) is None
     if near and not potential.space.loose:
         for side in _sides(volume):
             first = rest + side * size
@@ -221,8 +252,10 @@ def _inflated(potential: Potential, volume: float) -> State:
     if potential.space.loose:
         potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
     rest = potential.space.reference_volume
-    if volume == rest and not potential.flat:
+    if volume == rest and not (potential.flat or potential.space.strained):
         return flat_state(potential, magnetic=0.0)
+    if (drawn := unloaded(potential)) is not None and (state := _drawn_to(potential, drawn, volume)) is not None:
+        return state
     if not (potential.flat or potential.space.lids) and volume * rest < 0:
         return _mirrored(potential, _inflated(potential, -volume), volume)
     failure = spare = None
@@ -254,6 +287,17 @@ def _inflated(potential: Potential, volume: float) -> State:
     why = failure or "no guess led to an equilibrium"
     status = failure.status if failure else Status.NOT_CONVERGED
     raise SolveError(f"the membrane could not be inflated to V = {volume:.6g} without sources and loads: {why}", status=status)
+
+
+def _drawn_to(potential: Potential, drawn: State, volume: float) -> State | None:
+    """A bare membrane under tension led from no load to a volume; None where that leads to no sound state."""
+    if volume == drawn.volume:
+        return drawn
+    try:
+        state = march(potential, drawn, VolumeControl, drawn.volume, volume, magnetic=0.0)[-1]
+    except SolveError:
+        return None
+    return state if _sound(state) else None
 
 
 def _mirrored(potential: Potential, state: State, volume: float) -> State:
@@ -388,6 +432,9 @@ def _ways_from(
 ) -> Iterator[tuple[str, Way]]:
     """Ways to a load that is no volume."""
     rest = potential.space.reference_volume
+    if potential.space.strained:
+        nearest = usual_volume(potential)
+        yield f"the branch through V = {nearest:.6g}", lambda: _along(potential, start_at_volume(potential, nearest), held, load, accept)
     for share in (1.0, 10.0, 100.0):  # further out where the first branch ends, or takes too many steps
         for side in sides:
             first = rest + side * share * size
@@ -430,7 +477,8 @@ def _first_met(
 ) -> State | None:
     if point.state.value_of(held) == load and (accept is None or accept(point.state)):
         return point.state
-    away = abs(point.state.volume - potential.space.reference_volume) / potential.space.units["volume"]
+    space = potential.space
+    away = np.inf if space.strained else abs(point.state.volume - space.reference_volume) / space.units["volume"]
     control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
     tracer = Tracer(Predictor(), control.first * min(1.0, np.sqrt(away)), control)
     problem, spare = BranchProblem(potential), None
@@ -484,7 +532,7 @@ def _well_posed(state: State) -> bool:
 
 def _same(a: State, b: State) -> bool:
     potential = a.evaluation.potential
-    return a.x.shape == b.x.shape and distance(potential, a.x, b.x) <= _SAME * distance(potential, a.x, np.zeros_like(a.x))
+    return a.x.shape == b.x.shape and distance(potential, a.x, b.x) <= _SAME * displacement(potential, a.x)
 
 
 def _sound(state: State) -> bool:

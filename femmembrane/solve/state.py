@@ -55,7 +55,12 @@ class State:
 
 
 def rests_flat(potential: Potential) -> bool:
-    """Whether the undeformed membrane is an equilibrium without load: nothing pulls at it."""
+    """Whether the undeformed membrane is an equilibrium without load, and has no stiffness there: nothing pulls at it.
+
+    A membrane that is held where it does not rest is stretched, or compressed, without load: its states there are as all others.
+    """
+    if potential.space.strained:
+        return False
     return not potential.surrounded or not potential.evaluate(np.zeros(potential.space.n_free), 0.0).gradient.any()
 
 
@@ -84,6 +89,12 @@ def distance(potential: Potential, x: Array, y: Array) -> float:
     """Root mean square of the difference of two displacements over the reference area, in units of the membrane's own size."""
     d = x - y
     return float(np.sqrt(max(inner(potential, d, 0.0, d, 0.0), 0.0)))
+
+
+def displacement(potential: Potential, x: Array) -> float:
+    """Root mean square of a displacement, or of that which the places of the ends make where it is larger, in units as :func:`distance`."""
+    own = distance(potential, x, np.zeros_like(x))
+    return own if potential.space.lift is None else max(own, potential.space.lift_mean)
 
 
 @dataclass(slots=True)

@@ -31,7 +31,7 @@ from .banded import BorderedFactor, band_inner, band_product
 from .branch import BranchProblem, corrected, tangent_at, unit_point
 from .continuation import BranchPoint, Tracer, trace_points
 from .newton import TOLERANCE
-from .state import Predictor, State, distance, joined
+from .state import Predictor, State, displacement, distance, joined
 
 #: a cubic coefficient this small beside the terms that cancel in it vanishes by symmetry
 SYMMETRIC = 1e-4
@@ -149,7 +149,7 @@ def points_beyond(potential: Potential, crossing: Crossing, direction: int, trac
 
 def same_crossing(potential: Potential, a: Array, b: Array) -> bool:
     """Whether two located branch points, by their displacements, are one."""
-    return distance(potential, a, b) <= SAME_CROSSING * distance(potential, a, np.zeros_like(a))
+    return distance(potential, a, b) <= SAME_CROSSING * displacement(potential, a)
 
 
 def softest(potential: Potential, state: State) -> tuple[Array, float]:

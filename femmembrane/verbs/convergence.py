@@ -16,7 +16,7 @@ from ..scene import MAX_DEGREE, Scene
 from ..solve.controls import CONTROLS, Control, control_kind
 from ..solve.finer_space import transferred
 from ..solve.newton import correct
-from ..solve.start import moderate
+from ..solve.start import usual_volume
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_increasing, check_scene
@@ -213,7 +213,7 @@ class _Study:
 
     def _stretch(self, fine: Equilibrium) -> tuple[float, float] | None:
         """Volumes between which the first limit point lies on the reference mesh."""
-        first = fine.potential.space.reference_volume + moderate(fine.potential)
+        first = usual_volume(fine.potential)
         if fine.volume <= first:
             return None
         branch = trace(fine.scene, start=first, until={"volume": fine.volume})

@@ -19,7 +19,7 @@ from ..solve.continuation import BranchPoint, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
-from ..solve.start import moderate, start_at_volume
+from ..solve.start import start_at_volume, usual_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..stability.azimuthal import azimuthal_eigenvalue
@@ -151,7 +151,7 @@ def _first_state(potential: Potential, start: Start) -> State:
     if isinstance(start, Equilibrium):
         return resume(potential, start)
     if start is None:
-        return start_at_volume(potential, potential.space.reference_volume + moderate(potential))
+        return start_at_volume(potential, usual_volume(potential))
     if not is_number(start):
         raise InputError("start", start, "a volume, an Equilibrium, a SpecialPoint or a traced Branch is allowed")
     volume = number("start", start, "a volume is allowed")

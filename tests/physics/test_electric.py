@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import jn_zeros
 
 import femmembrane as fm
 from femmembrane.accuracy.shooting import Guess, shoot
@@ -190,3 +191,108 @@ def test_verdicts_of_a_charged_sphere():
         assert point.volume == pytest.approx(ball(limit), rel=1e-7)
         assert [branch[k].verdict("pressure").stable for k in (0, -1)] == [True, False]
         assert all(branch[k].verdict("volume").stable for k in (0, -1))
+
+
+def test_electrodes_on_a_part():
+    """Elements end where electrodes do: eight of degree 6 have all digits. Tension goes on there, and the stretch along it does not."""
+    part = {"voltage": 0.4, "start": 0.0, "stop": 0.53}
+    coarse, fine = (fm.equilibrium(under(DISC, **part).replace(mesh=fm.disc(n)), volume=1.2) for n in (8, 24))
+    assert coarse.pressure == pytest.approx(fine.pressure, rel=1e-11)
+    assert coarse.capacitance == pytest.approx(fine.capacitance, rel=1e-11)
+    assert not under(DISC, voltage=0.4, start=0.0, stop=1.0).element_ends
+    for degree, accuracy in ((6, 5e-5), (2, 2e-4)):  # of low degree slopes are recovered from each side alone
+        eq = fm.equilibrium(under(DISC, **part).replace(degree=degree), volume=1.2)
+        shape = eq.profile([0.53 - 1e-9, 0.53 + 1e-9])
+        tension = shape["total_stress_1"] / shape["stretch_1"]
+        assert tension[0] == pytest.approx(tension[1], rel=1e-3 if degree == 2 else 5e-4)
+        assert shape["stretch_1"] == pytest.approx([1.307774, 1.124646], rel=accuracy)  # of the finest of these meshes
+        assert shape["electric_field"][1] == 0
+
+
+def test_flat_disc_under_tension():
+    """Transverse modes of a disc stretched to p: omega^2 = j_nm^2 (1 - p^-6 - phi^2 p^2), whose zero is the loss of tension."""
+    p = 2.0
+    scene = DISC.replace(prestretch=p)
+    for phi in (0.0, 0.3, 0.49):
+        eq = fm.equilibrium(under(scene, voltage=phi), pressure=0.0)
+        assert eq.volume == 0
+        for n in (0, 1, 2):
+            exact = jn_zeros(n, 1)[0] ** 2 * (1 - p**-6 - phi**2 * p**2)
+            assert min(abs(mode.eigenvalue / exact - 1) for mode in eq.frequencies(azimuthal=n)) < 1e-8
+    with pytest.raises(fm.SolveError, match="compressive") as error:
+        fm.equilibrium(under(scene, voltage=0.5), volume=0.0)
+    assert error.value.status is fm.Status.LEGENDRE_FAILURE
+
+
+def test_fold_curve_over_the_voltage():
+    """The limit point of a sphere over phi: phi^2 = 7 l^-8 - l^-2."""
+    branch = fm.trace(under(SPHERE, voltage=0.2), start=ball(1.2), until={"volume": ball(1.5)})
+    limit = next(point for point in branch.special_points if point.kind == "limit_point")
+    curve = fm.fold_curve(under(SPHERE, voltage=0.2), start=limit, parameter="electric.voltage", bounds=(0.1, 0.45))
+    assert len(curve) > 3
+    stretch = np.cbrt(np.array(curve.volume) * 3 / (4 * np.pi))
+    assert np.array(curve.values) ** 2 == pytest.approx(7 * stretch**-8 - stretch**-2, rel=1e-6)
+
+
+def test_units():
+    """eps = 4.7 eps0, Phi = 5 kV, T = 0.5 mm, mu = 45 kPa: phi^2 = 0.0924771."""
+    scales = fm.Scales(radius=0.05, thickness=5e-4, shear_modulus=45e3)
+    scene = DISC.replace(scales=scales)
+    eq = fm.equilibrium(under(scene, voltage=5e3, relative_permittivity=4.7, breakdown=5e7), volume=1.0)
+    assert eq.voltage**2 == pytest.approx(0.0924771, rel=1e-6)
+    same = fm.equilibrium(under(DISC, voltage=eq.voltage), volume=1.0)
+    assert same.pressure == pytest.approx(eq.pressure, rel=1e-12)
+    charge = eq.charge * 0.05**2 * np.sqrt(4.7 * 8.8541878e-12 * 45e3)
+    held = fm.equilibrium(under(scene, total_charge=charge, relative_permittivity=4.7), volume=1.0)
+    assert (held.pressure, held.voltage) == pytest.approx((eq.pressure, eq.voltage), rel=1e-7)
+    thickness = 5e-4 / np.exp(np.log(eq.profile()["stretch_1"] * eq.profile()["stretch_2"]))
+    assert eq.breakdown_ratio == pytest.approx((5e3 / thickness).max() / 5e7, rel=0.02)  # at a node, not at a quadrature point
+
+
+@pytest.mark.parametrize(
+    ("electric", "key"),
+    [
+        ({}, "electric.voltage"),
+        ({"voltage": 0.3, "total_charge": 1.0}, "electric.total_charge"),
+        ({"voltage": -0.3}, "electric.voltage"),
+        ({"voltage": "high"}, "electric.voltage"),
+        ({"voltage": np.nan}, "electric.voltage"),
+        ({"voltage": 0.3, "from": 0.5, "to": 0.4}, "electric.to"),
+        ({"voltage": 0.3, "to": 1.5}, "electric.to"),
+        ({"voltage": 0.3, "from": -0.1}, "electric.from"),
+        ({"voltage": 0.3, "from": 1.0}, "electric.from"),
+        ({"voltage": 0.3, "breakdown": 0.0}, "electric.breakdown"),
+        ({"voltage": 0.3, "relative_permittivity": -4.7}, "electric.relative_permittivity"),
+        ({"voltage": 5e3, "relative_permittivity": 4.7}, "electric.relative_permittivity"),
+        ({"voltage": 0.3, "voltages": 1}, "electric.voltages"),
+    ],
+    ids=str,
+)
+def test_bad_input(electric, key):
+    with pytest.raises(fm.InputError) as error:
+        fm.Scene.from_dict({**DISC.to_dict(), "electric": electric})
+    assert error.value.key == key
+
+
+def test_scene_files():
+    for scene in (
+        under(DISC, voltage=0.3, start=0.1, stop=0.6, breakdown=2.0),
+        under(SPHERE, total_charge=1.5),
+        under(DISC, frozen_charge=0.2),
+        under(DISC, voltage=0.0),
+    ):
+        assert fm.Scene.from_dict(scene.to_dict()) == scene
+    assert DISC.replace(electric=fm.Electric(voltage=0.3, start=0.1)).to_dict()["electric"] == {"voltage": 0.3, "from": 0.1}
+
+
+def test_columns_and_files(tmp_path):
+    """What is electric is written where something is electric, and read back."""
+    branch = fm.inflate(under(DISC, voltage=PHI, breakdown=2.0), volumes=[1.0, 1.5])
+    frame = branch.to_dataframe()
+    assert {"electric_energy", "voltage", "charge", "capacitance", "electric_field", "breakdown_ratio"} <= set(frame)
+    assert frame["voltage"].tolist() == pytest.approx([PHI, PHI])
+    branch.save(tmp_path / "branch.nc")
+    again = fm.load(tmp_path / "branch.nc")
+    assert again[1].electric_energy == branch[1].electric_energy
+    assert again[1].charge == branch[1].charge
+    assert not {"electric_energy", "voltage"} & set(fm.inflate(DISC, volumes=[1.0]).to_dataframe())

@@ -196,7 +196,7 @@ class Equilibrium:
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
         return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
+    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
         Parameters
@@ -207,6 +207,9 @@ class Equilibrium:
             Number of waves around the axis; 0 for axisymmetric perturbations.
         gas : Gas, optional
             For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found.
+        electric : {"voltage", "charge"}, optional
+            What is held of the electrodes: the voltage, or the total charge, which stiffens axisymmetric perturbations. Default: what the
+            scene gives.
 
         Raises
         ------
@@ -222,14 +225,29 @@ class Equilibrium:
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
         gas = gas or self.gas if control == "gas" else None
-        key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
-        return self.remembered(key, lambda: self._judged(control, azimuthal, gas))
+        key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
+        potential = self.potential if electric is None else self._holding(electric)
+        key = key if potential is self.potential else (*key, electric)
+        return self.remembered(key, lambda: self._judged(potential, control, azimuthal, gas))
+
+    def _holding(self, electric: str) -> Potential:
+        """The potential with the same forces in this state that holds the voltage, or the total charge."""
+        from ..potential import potential_of
+
+        choice("electric", electric, ("voltage", "charge"))
+        own = self.scene.electricity
+        if own is None or own.frozen_charge is not None:
+            raise InputError("electric", electric, "allowed with electrodes that have a voltage or a total charge")
+        name, number = ("voltage", self.voltage) if electric == "voltage" else ("total_charge", self.charge)
+        if own.load == name:
+            return self.potential
+        return potential_of(self.scene.replace(electric=replace(own, **{own.load: None, name: number})))
 
     @one_thread
-    def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
-        evaluation = self.potential.evaluate(self.state, self.pressure)
+    def _judged(self, potential: Potential, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+        evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
-        return door.checked_verdict(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+        return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:

@@ -178,6 +178,12 @@ def test_held_by_its_charge_or_its_voltage(q):
     counts = [found.potential.evaluate(found.state, found.pressure).negative for found in (eq, other)]
     assert counts[0] == counts[1] - (q > 1)
     assert eq.verdict("pressure").stable is (q < 1)
+    for control in ("pressure", "volume"):
+        smallest = other.verdict(control).smallest_eigenvalue
+        assert eq.verdict(control, electric="voltage").smallest_eigenvalue == pytest.approx(smallest, rel=1e-6)
+        smallest = eq.verdict(control).smallest_eigenvalue
+        assert other.verdict(control, electric="charge").smallest_eigenvalue == pytest.approx(smallest, rel=1e-6)
+    assert "the voltage held" in other.verdict("pressure").reason
     # at n = 0 the operator of waves is the same one
     assert eq.frequencies(count=1)[0].eigenvalue == pytest.approx(eq.verdict("pressure").smallest_eigenvalue, rel=1e-6)
 

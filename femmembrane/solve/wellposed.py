@@ -20,6 +20,7 @@ from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
 from .finer_space import confirmed
+from .pull_in import pulled_in
 from .state import State
 
 #: stress relative to the largest one that counts as none
@@ -41,15 +42,20 @@ class IllPosed:
     slack : bool
     confirmed : bool
         Whether it is more than this mesh alone says: False where the state was not found in finer spaces, which could contradict.
+    pulled : bool
+        Whether it is a field that takes the stiffness of the sheet along the meridian, see :mod:`.pull_in`.
     """
 
     low: float
     high: float
     slack: bool
     confirmed: bool = True
+    pulled: bool = False
 
     @property
     def status(self) -> Status:
+        if self.pulled:
+            return Status.PULLED_IN
         return Status.SLACK if self.slack else Status.LEGENDRE_FAILURE
 
     @property
@@ -58,6 +64,8 @@ class IllPosed:
 
     def __str__(self) -> str:
         doubt = "" if self.confirmed else f" ({UNCONFIRMED})"
+        if self.pulled:
+            return f"the field leaves no stiffness along the meridian at {self.where}: the sheet is pulled in there"
         if self.slack:
             return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there{doubt}"
         return f"the meridional stress is compressive at {self.where}: the Legendre-Hadamard condition fails there{doubt}"
@@ -68,8 +76,8 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     shows.
     """
     found = apparent(potential, evaluation)
-    if found is None:
-        return None
+    if found is None or found.pulled:
+        return found
     if found.slack:
         sure = confirmed(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation)
         return None if sure is False else replace(found, confirmed=bool(sure))
@@ -84,6 +92,9 @@ def _nearly_slack(evaluation: Evaluation) -> bool:
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation, an equilibrium or not, is ill-posed on its own mesh."""
     slack = potential.scene.tension_field
+    pulled = pulled_in(potential, evaluation)
+    if pulled.size:
+        return IllPosed(float(pulled.min()), float(pulled.max()), False, pulled=True)
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
     scale = stress_scale(evaluation)  # zero in the flat unloaded membrane, which is not slack but at rest
@@ -182,8 +193,8 @@ def is_slack(potential: Potential, state: State) -> bool:
 def slackness(potential: Potential, state: State, accepted: list[State] | None = None) -> SolveError:
     """The error that ends a path at an ill-posed state, slack or compressed, with the states accepted before and it."""
     where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
-    status = Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
     found = ill_posed(potential, state.evaluation) or apparent(potential, state.evaluation)
+    status = found.status if found else Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
     return SolveError(f"at {where} {found}", status=status, result=accepted)
 
 

@@ -16,7 +16,8 @@ from ..discretization.space import Space
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Verdict
-from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, least_stress
+from ..solve.pull_in import shears_in
+from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
 from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
 from .mode_resolution import unresolved, unresolved_stress
@@ -145,4 +146,7 @@ def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves
         if zone is not None:
             doubt = "" if zone.confirmed else f" ({UNCONFIRMED})"
             found.append(ShortWaves(f"{name} stress compressive at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
+    pulled = shears_in(potential, evaluation)
+    if pulled.size and not found:
+        found.append(ShortWaves(f"the field leaves no stiffness in the plane at {interval(pulled.min(), pulled.max())}", True))
     return found

@@ -10,6 +10,7 @@ import femmembrane as fm
 from femmembrane.accuracy.shooting import Guess, shoot
 from femmembrane.potential import potential_of
 from femmembrane.solve.banded import band_product
+from femmembrane.solve.pull_in import moduli
 from tests.cases import OGDEN, effect
 
 DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=6)
@@ -302,3 +303,31 @@ def test_columns_and_files(tmp_path):
     assert again[1].electric_energy == branch[1].electric_energy
     assert again[1].charge == branch[1].charge
     assert not {"electric_energy", "voltage"} & set(fm.inflate(DISC, volumes=[1.0]).to_dataframe())
+
+
+def test_pulled_in():
+    """Ogden's rubber loses its stiffness in the plane while it is in tension: a status of its own, and no eigenvalue."""
+    scene = under(DISC, voltage=PHI).replace(material=fm.Ogden.treloar(), mesh=fm.disc(12), degree=4)
+    branch = fm.trace(scene, start=1.5, until={"volume": 40.0}, max_steps=80)
+    assert branch.status is fm.Status.PULLED_IN
+    assert "no stiffness along the meridian" in branch.message
+    assert min(branch[-1].profile()["total_stress_1"]) > 0
+
+
+@pytest.mark.parametrize("square", [0.02, 0.1, 0.2, 0.4])
+def test_stiffness_in_the_plane(square):
+    """The condition in closed form against the acoustic tensor of 400 directions, at homogeneous strains of the material."""
+    scene = under(DISC, voltage=np.sqrt(square)).replace(material=fm.Ogden.treloar())
+    rng = np.random.default_rng(2)
+    angles = np.linspace(0, np.pi, 400)
+    for e1, e2 in rng.uniform(-0.1, 1.4, (40, 2)):
+        d11, d22, mixed, shear = moduli(potential_of(scene), *(np.array([e]) for e in (e1, e2)), np.array([square]))
+        closed = bool((d11 > 0) & (d22 > 0) & (shear > 0) & (np.sqrt(np.abs(d11 * d22)) + shear > np.abs(mixed)))
+        tensor = np.array(
+            [
+                [d11 * np.cos(angles) ** 2 + shear * np.sin(angles) ** 2, mixed * np.cos(angles) * np.sin(angles)],
+                [mixed * np.cos(angles) * np.sin(angles), d22 * np.sin(angles) ** 2 + shear * np.cos(angles) ** 2],
+            ]
+        )
+        scanned = np.linalg.eigvalsh(tensor.transpose(2, 0, 1)).min()
+        assert closed == (scanned > 0) or abs(scanned) < 1e-3 * shear

@@ -54,6 +54,7 @@ class Family(Potential):
         number = ca.SX.sym("number")
         with casadi_answers_numpy():
             super().__init__(vary(number), quadrature)
+        self.electric = self.scene.electricity  # of the family: with the number as a symbol, or another than that of the scene below
         self._vary = vary
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         slot = self.symbols[2][1]

@@ -198,7 +198,6 @@ class Potential:
         )
         space = self.space
         self.sheet = Sheet.of(scene)
-        self.electric = scene.electricity
         if not space.n_free:
             advice = f"of degree {scene.degree}, between these ends, nothing can move; more elements or a higher degree are allowed"
             raise InputError("mesh.elements", space.n_elements, advice)
@@ -236,6 +235,11 @@ class Potential:
         """Whether anything but the pressure acts on the membrane. Otherwise the flat unloaded state is an equilibrium without stiffness."""
         return bool(self.sources or self.loads or self.electric)
 
+    @cached_property
+    def electric(self) -> Electric | None:
+        """Voltage or charge of the scene without units; None without."""
+        return self.scene.electricity
+
     def square(self, x: Array, factor: float = 1.0) -> float | None:
         """phi^2, or the frozen q^2, of a state; None without voltage and charge. ``factor`` as in :meth:`evaluate`."""
         if self.electric is None:
@@ -244,7 +248,7 @@ class Potential:
 
     def charge_squared(self, factor: float) -> float:
         """Q^2 of a total charge. ``factor`` as in :meth:`evaluate`."""
-        return factor * float(cast("Electric", self.electric).total_charge or 0.0) ** 2
+        return factor * float(cast("Electric", self.scene.electricity).total_charge or 0.0) ** 2
 
     @cached_property
     def charged(self) -> Charged | None:
@@ -327,11 +331,15 @@ class Potential:
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
+        return self._evaluated(x, pressure, magnetic, magnetic)
+
+    def _evaluated(self, x: Array, pressure: float, slot: float, magnetic: float) -> Evaluation:
+        """:meth:`evaluate` with what the point function takes for the factor on sources and loads."""
         elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
         if self.charged is None:
-            return Evaluation(x, *elements.evaluate(x, pressure, magnetic), self, elements, magnetic)
+            return Evaluation(x, *elements.evaluate(x, pressure, slot), self, elements, magnetic)
         square, spring = self.charged.at(x, magnetic)
-        return Evaluation(x, *elements.evaluate(x, pressure, magnetic, square), self, elements, magnetic, spring)
+        return Evaluation(x, *elements.evaluate(x, pressure, slot, square), self, elements, magnetic, spring)
 
     def load_energy(self, x: Array, factor: float = 1.0) -> float:
         """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""

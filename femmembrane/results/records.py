@@ -127,6 +127,11 @@ class Equilibrium:
 
     @property
     def _electric(self) -> dict[str, float]:
+        own = self.scene.electric
+        if own is not None and self.scene.electricity is None:  # no voltage or charge on electrodes that have a capacitance
+            plain = replace(own.plain(self.scene.scales), **{own.load: 1.0})
+            found = self.in_scene(self.scene.replace(electric=plain, scales=None))._electric
+            return {**dict.fromkeys(found, 0.0), "capacitance": found["capacitance"]}
         return self.remembered(("electric",), lambda: self.potential.electric_quantities(self.state))
 
     @property

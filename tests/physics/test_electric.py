@@ -117,6 +117,10 @@ def test_energy_along_a_branch():
     a, b = (fm.equilibrium(under(DISC, voltage=PHI + k * h), volume=1.5) for k in (-1, 1))
     assert (b.energy - a.energy) / (2 * h) == pytest.approx(-eq.charge, rel=1e-7)
     assert eq.charge == pytest.approx(PHI * eq.capacitance, rel=1e-14)
+    bare = fm.equilibrium(under(DISC, voltage=0.0), volume=1.5)  # electrodes without voltage have a capacitance
+    near = fm.equilibrium(under(DISC, voltage=1e-6), volume=1.5)
+    assert (bare.voltage, bare.charge) == (0, 0)
+    assert bare.capacitance == pytest.approx(near.capacitance, rel=1e-9)
 
 
 @pytest.mark.parametrize("electric", [{"voltage": PHI}, {"frozen_charge": 0.5}], ids=str)

@@ -242,9 +242,18 @@ def _with_fields(potential: Potential, volume: float) -> State:
         last = (error.result or [bare])[-1]
         touching = potential.distance_to_sources(last.x) < NEAR * potential.space.unit
         raise SolveError(
-            f"the sources could not be turned on to their full strength at V = {volume:.6g}; try another volume or a lower strength",
+            f"{_acting(potential)} could not be turned on to their full strength at V = {volume:.6g}; "
+            "try another volume or a lower strength",
             status=Status.DIPOLE_CONTACT if touching else Status.NO_EQUILIBRIUM,
         ) from error
+
+
+def _acting(potential: Potential) -> str:
+    """What was to be turned on, in words."""
+    if potential.electric is None:
+        return "the sources"
+    word = "voltage" if potential.electric.load == "voltage" else "charge"
+    return f"the sources and the {word}" if potential.sources else f"the {word}"
 
 
 def _inflated(potential: Potential, volume: float) -> State:

@@ -335,3 +335,41 @@ def test_stiffness_in_the_plane(square):
         )
         scanned = np.linalg.eigvalsh(tensor.transpose(2, 0, 1)).min()
         assert closed == (scanned > 0) or abs(scanned) < 1e-3 * shear
+
+
+@pytest.mark.parametrize("electric", [{"voltage": 0.4}, {"total_charge": 0.5}, {"frozen_charge": 0.4}], ids=str)
+@pytest.mark.parametrize("tension_field", [False, True])
+def test_uneven_sheet_with_everything(electric, tension_field):
+    """Energy and gradient agree on an uneven sheet with electrodes on a part, beside a dipole and a weight; so does stiffness."""
+    scene = under(DISC, **electric, start=0.2, stop=0.7).replace(
+        mesh=fm.disc(4),
+        degree=3,
+        thickness="1 - 0.4*R**2",
+        modulus="1 + 0.3*R",
+        sources=[fm.Dipole(100, 6.0)],
+        susceptibility=2.5,
+        loads=[fm.Weight(weight=0.2)],
+        tension_field=tension_field,
+    )
+    potential = potential_of(scene)
+    r = potential.space.interpolation_points()
+    x = potential.space.interpolate(-0.2 * r * (1 - r**2), 0.6 * (1 - r**4))
+    evaluation, h = potential.evaluate(x, 0.3), 1e-6
+    direction = np.random.default_rng(4).standard_normal(x.size)
+    a, b = (potential.evaluate(x + k * h * direction, 0.3) for k in (1, -1))
+    slope = (a.energy - 0.3 * a.volume - b.energy + 0.3 * b.volume) / (2 * h)
+    assert -evaluation.unbalanced @ direction == pytest.approx(slope, rel=1e-6)
+    other = np.random.default_rng(5).standard_normal(x.size)
+    change = (b.unbalanced - a.unbalanced) @ other / (2 * h)
+    assert evaluation.inner(direction, other) == pytest.approx(change, rel=1e-5)
+    assert evaluation.electric_energy != 0
+    assert evaluation.load_energy != 0
+
+
+def test_charge_in_a_gas():
+    """With a gas as well two borders stiffen the membrane: each class is stiffer than the one before."""
+    gas = fm.Gas(amount=6.0, chamber=3.0, atmosphere=1.0)
+    eq = fm.equilibrium(under(DISC, total_charge=0.8), gas=gas)
+    found = [eq.verdict(c, electric=e).smallest_eigenvalue for c in ("pressure", "gas", "volume") for e in ("voltage", "charge")]
+    assert found[0] < found[1] < found[3] < found[5] + 1e-9
+    assert found[0] < found[2] < found[4] + 1e-9

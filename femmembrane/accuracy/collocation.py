@@ -54,6 +54,7 @@ def collocate(
     form = StrongForm(scene)
     scale = max(abs(load), 1.0) if control == "volume" else 0.0  # a large volume would hide the round-off of the rest
     r, first = _first(form, guess, scale)
+    stretch, height = form.rim
     n = len(first)
     singular = np.zeros((n, n))
     singular[:4, :4] = SINGULAR
@@ -63,7 +64,7 @@ def collocate(
         return f if n == 4 else np.vstack([f, form.densities(r, y[:4])[:1] / scale])
 
     def conditions(pole: Array, rim: Array, p: Array | None = None) -> Array:
-        ends = [pole[2], pole[3], rim[0], rim[1]]
+        ends = [pole[2], pole[3], rim[0] - np.log(stretch), rim[1] - height]
         if control == "volume":
             ends += [pole[4], rim[4] - load / scale]
         elif control == "center_height":

@@ -89,7 +89,8 @@ class _Shooter:
         return self._miss(self.shot(u)[0])
 
     def _miss(self, rim: Array) -> Array:
-        rows = [np.expm1(rim[0]), rim[1]]
+        stretch, height = self.form.rim
+        rows = [np.expm1(rim[0] - np.log(stretch)), rim[1] - height]
         if self.control == "volume":
             rows.append((rim[4] - self.load) / max(abs(self.load), 1.0))
         return np.array(rows)

@@ -12,8 +12,8 @@ are (e_2, eta, d, phi) with d = e_1 - e_2: at the pole d and phi vanish and ever
 
     y' = S y/r + f(r, y),      S = [[0 0 1 0], [0 0 0 0], [0 0 -2 0], [0 0 0 -1]],      f(0, y) = (0, 0, 0, (m_eta - P lambda^2)/W_1)
 
-and at the rim e_2 = eta = 0. The energies, the volume and the force of the sources follow from the formulas of the material and the
-sources.
+and at the rim e_2 = eta = 0, or what its own place asks for. The energies, the volume and the force of the sources follow from the
+formulas of the material and the sources.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import between, convert, number, only
+from ..discretization.lift import lift_of
 from ..discretization.meridian import Disc
 from ..errors import InputError
 from ..physics.loads import over_projection, over_reference
@@ -52,6 +53,8 @@ class StrongForm:
 
     Attributes
     ----------
+    rim : (float, float)
+        Stretch around the rim, and its height over R0.
     evaluations : int
         Radii at which right-hand sides were computed so far.
 
@@ -75,6 +78,8 @@ class StrongForm:
             allowed = "a voltage or a frozen charge on the whole membrane is allowed: the equations here are local and smooth"
             raise InputError(f"electric.{electric.load}", getattr(electric, electric.load), allowed)
         self.material = response_of(scene, None if electric is None else squared(electric))
+        lift = lift_of(scene.mesh, scene.prestretch)
+        self.rim = (1.0, 0.0) if lift is None else (1 + lift.radial[1], lift.axial[1])
         self.susceptibility = scene.susceptibility or 0.0
         self.sources = acting_sources(scene.sources, self.susceptibility)
         self.loads = tuple(load for load in scene.loads if load.acts)
@@ -122,7 +127,7 @@ class StrongForm:
         l1, rho = np.exp(e2 + d), np.exp(e2) * r
         magnetic = self._magnetic(rho, eta) if self.sources else np.zeros_like(rho)
         elastic = self.material.energy(e2 + d, e2)
-        return 2 * np.pi * np.array([rho * l1 * np.cos(phi) * eta, r * elastic, r * magnetic])
+        return 2 * np.pi * np.array([rho * l1 * np.cos(phi) * (eta - self.rim[1]), r * elastic, r * magnetic])
 
     def pole(self, r: Any, center_height: Any, stretch: Any, pressure: Any) -> Array:
         """The regular solution near the pole, y at small radii r > 0 up to terms of order r^4, shape (4, n)."""

@@ -14,6 +14,9 @@ from .lift import lift_of
 from .meridian import LEAST_LENGTH, Array, Meridian, extent, side
 from .supports import as_support, floats, free_rotations
 
+#: displacement along the axis, over the size of a membrane under tension, that is told from none
+_SMALL = 1e-5
+
 
 class Numbering:
     """A meridian of elements of one degree: what holds it, where its quadrature points are, and how its unknowns are numbered.
@@ -219,11 +222,15 @@ class Numbering:
 
     @cached_property
     def lift_size(self) -> tuple[float, float]:
-        """Largest displacements across and along the axis that the places of the ends make of themselves, without any unknown."""
+        """Largest displacements across and along the axis that the places of the ends make of themselves, without any unknown.
+
+        Tension holds the membrane across its plane, where a displacement passes through zero as any other number: one that is smaller than
+        a small part of the membrane has no size of its own.
+        """
         if self.lift is None or not self.strained:
             return 0.0, 0.0
         u, _, w, _ = self.lift.at(self.mesh, self.ends)
-        return float(np.abs(u).max()), float(np.abs(w).max())
+        return float(np.abs(u).max()), max(float(np.abs(w).max()), _SMALL * self.unit)
 
     @cached_property
     def lift_mean(self) -> float:

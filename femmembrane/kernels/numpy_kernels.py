@@ -192,7 +192,7 @@ def _sparse_count(band: Array, kd: int, constraint: Array | None, compliance: fl
     try:
         lu = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError:  # exactly singular: directions without stiffness, as the flat unloaded disc has them, are not negative
-        nudge = np.finfo(float).eps * np.abs(band).max() * sparse.eye_array(n, format="csc")
+        nudge = np.finfo(float).eps * (np.abs(band).max() or 1.0) * sparse.eye_array(n, format="csc")
         lu = splu(matrix + nudge, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     count = int((lu.U.diagonal() < 0).sum())
     if constraint is None:

@@ -66,7 +66,7 @@ def unloaded(potential: Potential) -> State | None:
     None where they are held where they rest, where that state was not found, and where it is compressed: it is no place to start from.
     """
     state = _without_load(potential)
-    return state if state is not None and _sound(state) else None
+    return state if state is not None and state.evaluation.stress[0].min() > 0 and _sound(state) else None
 
 
 def _without_load(potential: Potential) -> State | None:

@@ -97,8 +97,10 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
         return IllPosed(float(pulled.min()), float(pulled.max()), False, pulled=True)
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
-    scale = stress_scale(evaluation)  # zero in the flat unloaded membrane, which is not slack but at rest
-    r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack)]
+    scale = stress_scale(evaluation)
+    if not scale and not potential.space.strained:  # the unloaded membrane is not slack but at rest, where its ends do not bring it closer
+        return None
+    r = potential.space.R.ravel()[unsupported(evaluation.stress[0], scale, slack) | (not scale)]
     if slack:
         r = np.append(r, _folds(potential, evaluation, scale))
     return IllPosed(float(r.min()), float(r.max()), slack) if r.size else None

@@ -23,13 +23,13 @@ with (0, e) and slope 1 is e (1 + log(r/e)) near the pole. So the printed answer
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..checks import choice
-from ..discretization.meridian import disc
+from ..discretization.meridian import Disc, disc
 from ..errors import InputError, SolveError, Status
 from ..physics.loads import over_projection
 from ..potential import Array, Potential, potential_of
@@ -156,7 +156,8 @@ def _smooth(equilibrium: Equilibrium) -> tuple[Potential, Array, float]:
     scene, old = equilibrium.scene, equilibrium.potential
     if scene.degree >= 6:
         return old, equilibrium.state, equilibrium.pressure
-    potential = potential_of(scene.replace(mesh=disc(_SMOOTH_ELEMENTS), degree=_SMOOTH_DEGREE))
+    smooth = disc(_SMOOTH_ELEMENTS, rim=cast(Disc, scene.mesh).rim)
+    potential = potential_of(scene.replace(mesh=smooth, degree=_SMOOTH_DEGREE))
     volume, pressure, height = equilibrium.volume, equilibrium.pressure, equilibrium.center_height
     # at a fold in one quantity another quantity still tells neighbouring equilibria apart
     for control in (CenterHeightControl(height), VolumeControl(volume), PressureControl(pressure)):

@@ -141,6 +141,18 @@ def equilibrium(
     Raises
     ------
     InputError, SolveError
+
+    Examples
+    --------
+    A disc that is stretched over its rim is stiff without any load; it bulges in proportion to a small pressure.
+
+    >>> import femmembrane as fm
+    >>> drum = fm.Scene(material=fm.NeoHookean(), prestretch=1.5)
+    >>> flat = fm.equilibrium(drum, pressure=0.0)
+    >>> print(f"{flat.volume:.3f} {flat.frequencies(count=1)[0].omega:.4f}")
+    0.000 2.2968
+    >>> print(f"{fm.equilibrium(drum, volume=0.3).pressure:.5f}")
+    0.13723
     """
     given = {"volume": volume, "pressure": pressure, "center_height": center_height, "gas": gas}
     control, load = only("equilibrium", given, "exactly one of volume, pressure, center_height and gas is allowed")

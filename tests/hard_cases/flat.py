@@ -154,3 +154,53 @@ def weak_pull(strength: float, height: float) -> float:
 def pull_from_either_side() -> float:
     above, below = (settled(fm.equilibrium(disc_scene(OGDEN, (200.0, h)), pressure=0.0)) for h in (4.0, -4.0))
     return above.volume + below.volume if above.volume > 0.5 else float("nan")
+
+
+STRETCHED = "flat under tension is a state as any other"
+
+
+def drum(prestretch: float) -> fm.Scene:
+    return NH.replace(prestretch=prestretch)
+
+
+@FAMILY.case("pre-stretch 1 + 1e-9, P = 0", "a tension of 6e-9, and no stiffness beside it", Number(1.0, rel=1e-6), 1 + 1e-9)
+@FAMILY.case("pre-stretch 1.5, P = 0", STRETCHED, Number(1.0, rel=1e-6), 1.5)
+@FAMILY.case("pre-stretch 1000, P = 0", "a rim of 1000 R0", Number(1.0, rel=1e-6), 1e3)
+def rings(prestretch: float) -> float:
+    """Squared frequency over its closed form j^2 (1 - p^-6)."""
+    tension = 6e-9 if prestretch < 1 + 1e-6 else 1 - prestretch**-6
+    eq = settled(fm.equilibrium(drum(prestretch), pressure=0.0))
+    return eq.frequencies(count=1)[0].eigenvalue / (2.404825557695773**2 * tension)
+
+
+@FAMILY.case("pre-stretch 1 + 1e-9, V = 0.001", "the tension adds 8 T V/pi = 1.5e-11 to P", Number(1.0, rel=1e-2), 1e-3)
+@FAMILY.case("pre-stretch 1 + 1e-9, V = -1", "nothing of the pre-stretch is left", Number(1.0, rel=1e-7), -1.0)
+def hardly_stretched(volume: float) -> float:
+    """P over that of the disc without pre-stretch."""
+    both = [settled(fm.equilibrium(scene, volume=volume)).pressure for scene in (drum(1 + 1e-9), NH)]
+    return both[0] / both[1]
+
+
+@FAMILY.case("pre-stretch 1000, limit point", "V = 2e9, P = 2e-3: a half sphere of a soap film", Number((2.0, 2.0944), rel=1e-4))
+def far_stretched() -> tuple[float, float]:
+    (peak,) = fm.trace(drum(1e3), until={"volume": 5e9}).special_points
+    return peak.pressure * 1e3, peak.volume / 1e9
+
+
+@FAMILY.case("pre-stretch 1 + 1e-9, V: 1, 0, -1", STRETCHED, Number((0.0, 1.0), abs=1e-9), 1 + 1e-9)
+@FAMILY.case("pre-stretch 1000, V: 1e9, 0, -1e9", STRETCHED, Number((0.0, 1.0), abs=1e-9), 1e3)
+def through_tension(prestretch: float) -> tuple[float, float]:
+    """V in the middle, and P of the last state over P of the first, sign reversed."""
+    far = prestretch**3
+    run = reached(fm.inflate(drum(prestretch), volumes=[far, 0.0, -far]))
+    return run[1].volume / far, -run[2].pressure / run[0].pressure
+
+
+@FAMILY.case("pre-stretch 0.8, V = 0", "flat it is compressed", Stop(fm.Status.LEGENDRE_FAILURE, "stress is compressive"))
+def pushed_together() -> fm.Equilibrium:
+    return fm.equilibrium(drum(0.8), volume=0.0, solver="ipopt")
+
+
+@FAMILY.case("pre-stretch 0.8, a trace to V = 2", "domes are taut from V = 0.3 on", Number(2.0, rel=1e-9))
+def domes_of_a_loose_disc() -> float:
+    return reached(fm.trace(drum(0.8), until={"volume": 2.0}))[-1].volume

@@ -21,6 +21,7 @@ from .errors import InputError as InputError
 from .errors import SolveError as SolveError
 from .errors import Status as Status
 from .physics.chamber import Chamber as Chamber
+from .physics.electric import Electric as Electric
 from .physics.hooke import Hooke as Hooke
 from .physics.invariant import ArrudaBoyce as ArrudaBoyce
 from .physics.invariant import ExtendedTube as ExtendedTube

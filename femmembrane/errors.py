@@ -30,6 +30,7 @@ class Status(StrEnum):
     NOT_A_MINIMUM = "not a minimum"
     LEGENDRE_FAILURE = "Legendre condition fails"
     SLACK = "slack"
+    PULLED_IN = "pulled in"
     NOT_RESOLVED = "not resolved"
     STEP_LIMIT = "step limit"
     UNEXPLAINED_INERTIA = "unexplained change of inertia"
@@ -43,8 +44,8 @@ class Status(StrEnum):
 
     @property
     def ill_posed(self) -> bool:
-        """Whether the state depends on the mesh: compressed along the meridian, or slack in a tension field."""
-        return self in (Status.LEGENDRE_FAILURE, Status.SLACK)
+        """Whether the state depends on the mesh: compressed along the meridian, slack in a tension field, or pulled in."""
+        return self in (Status.LEGENDRE_FAILURE, Status.SLACK, Status.PULLED_IN)
 
 
 _ADVICE = {
@@ -65,6 +66,7 @@ _ADVICE = {
     "depend on the mesh; a tension field (effects.tension_field = true) wrinkles instead",
     Status.SLACK: "where no tension is left along the meridian the membrane folds onto itself, and its tension field ends; "
     "a finer mesh comes closer to such a fold, not past it",
+    Status.PULLED_IN: "the field leaves the sheet no stiffness there and thins it without end; lower the voltage, or hold the charge",
 }
 
 

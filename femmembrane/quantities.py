@@ -155,14 +155,23 @@ QUANTITIES: Mapping[str, Quantity] = {
     "center_height_m": Quantity(
         "height of the pole, or the first point of the meridian", "m", symbol="pole height in m", words="pole height"
     ),
-    "energy": Quantity("elastic, magnetic and load energy over mu T R0^2", symbol="E total", words="total energy", form=".8g", si="energy"),
+    "energy": Quantity(
+        "elastic, magnetic, load and electric energy over mu T R0^2", symbol="E total", words="total energy", form=".8g", si="energy"
+    ),
     "elastic_energy": Quantity("elastic energy over mu T R0^2", symbol="E elastic", si="energy"),
     "magnetic_energy": Quantity("magnetic energy over mu T R0^2", symbol="E magnetic", si="energy"),
     "load_energy": Quantity("energy of the loads over mu T R0^2", symbol="E loads", si="energy"),
-    "energy_j": Quantity("elastic, magnetic and load energy", "J", symbol="E total in J", words="total energy"),
+    "energy_j": Quantity("elastic, magnetic, load and electric energy", "J", symbol="E total in J", words="total energy"),
     "elastic_energy_j": Quantity("elastic energy", "J", symbol="E elastic in J", words="elastic energy"),
     "magnetic_energy_j": Quantity("magnetic energy", "J", symbol="E magnetic in J", words="magnetic energy"),
     "load_energy_j": Quantity("energy of the loads", "J", symbol="E loads in J", words="energy of the loads"),
+    "electric_energy": Quantity("energy of voltage or charge over mu T R0^2", symbol="E electric", si="energy"),
+    "electric_energy_j": Quantity("energy of voltage or charge", "J", symbol="E electric in J", words="energy of voltage or charge"),
+    "voltage": Quantity("voltage (Phi/T) sqrt(eps/mu)", symbol="phi", words="voltage", label="voltage φ"),
+    "charge": Quantity("charge over R0^2 sqrt(eps mu)", symbol="Q", words="charge", label="charge Q"),
+    "capacitance": Quantity("capacitance over eps R0^2/T", symbol="C", words="capacitance", label="capacitance C"),
+    "electric_field": Quantity("true electric field over sqrt(mu/eps)", label="electric field"),
+    "breakdown_ratio": Quantity("largest true electric field over the breakdown field"),
     "gas": Quantity("amount of gas (P + atmosphere)(V + chamber) over mu T R0^2", words="amount of gas", label="amount of gas"),
     "residual": Quantity("out-of-balance force relative to the forces in balance"),
     "iterations": Quantity("solver iterations, rejected attempts included", type=int),

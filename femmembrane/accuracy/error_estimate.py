@@ -17,7 +17,7 @@ from ..potential import Array, Evaluation, Potential, potential_of
 from ..results.error_estimate import ErrorEstimate, from_numbers
 from ..results.verdict import Verdict
 from ..scene import MAX_DEGREE, Scene
-from ..solve.banded import negative_directions
+from ..solve.banded import negative_among
 from ..solve.controls import CONTROLS, control_kind
 from ..solve.finer_space import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
@@ -120,7 +120,7 @@ def _side(potential: Potential, evaluation: Evaluation, control: str) -> int:
     if control == "center_height":
         return 0
     constraint = evaluation.volume_gradient if control == "volume" else None
-    return negative_directions(evaluation.band, potential.space.half_bandwidth, constraint)
+    return negative_among(evaluation, constraint)
 
 
 def _verdicts(

@@ -31,6 +31,7 @@ from ..discretization.meridian import Disc
 from ..errors import InputError
 from ..physics.loads import over_projection, over_reference
 from ..physics.magnetisation import Magnetisation, position_energy_density, sources_that_act
+from ..physics.response import response_of, squared
 from ..scene import Scene
 from .sloped import is_strong, pull
 
@@ -73,9 +74,13 @@ class StrongForm:
                 raise InputError(f"membrane.{key}", getattr(scene, key).given, "an even sheet is allowed here")
         if not isinstance(scene.mesh, Disc):
             raise InputError("mesh.shape", getattr(scene.mesh, "shape", scene.mesh), "the disc is allowed")
+        electric = scene.electricity
+        if electric is not None and (electric.total_charge is not None or electric.ends):
+            allowed = "a voltage or a frozen charge on the whole membrane is allowed: the equations here are local and smooth"
+            raise InputError(f"electric.{electric.load}", getattr(electric, electric.load), allowed)
+        self.material = response_of(scene, None if electric is None else squared(electric))
         lift = lift_of(scene.mesh, scene.prestretch)
         self.rim = (1.0, 0.0) if lift is None else (1 + lift.radial[1], lift.axial[1])
-        self.material = scene.material
         self.susceptibility = scene.susceptibility or 0.0
         self.saturation = scene.saturation
         self.sources = sources_that_act(scene)

@@ -45,6 +45,8 @@ class Numbering:
         The displacement that carries the held ends to their places; the unknowns are what there is beside it.
     strained : bool
         Whether the places of the ends strain the membrane, so that it is under tension, or compressed, without any load.
+    breaks : list of int
+        The ends of elements at which ``ends`` are, where slopes may jump.
     closed : bool
         Whether the last node is the first one.
     size : float
@@ -107,6 +109,7 @@ class Numbering:
     ) -> None:
         self.mesh, self.degree, self.anchored, self.side = mesh, degree, anchored, side(mesh)
         self.ends: Array = with_ends(mesh.breakpoints(), ends)
+        self.breaks: list[int] = [int(k) for k in np.flatnonzero(np.isin(self.ends[1:-1], ends)) + 1] if ends else []
         self.sizes: Array = np.diff(self.ends)
         line = skfem.MeshLine(self.ends)
         element = line_element(degree)

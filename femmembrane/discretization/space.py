@@ -263,7 +263,8 @@ class Space(Numbering):
         """Jumps of the deformed meridian's slope, relative to the smaller of both sides: where elements meet, then at the poles.
 
         The slope is taken with respect to arc length at rest: a vector as long as the meridional stretch. At a pole it is compared with its
-        mirror image. A kink at rest counts only as far as it has grown.
+        mirror image. A kink at rest counts only as far as it has grown, and where the sheet or its electrodes have ends the
+        direction alone.
 
         Returns
         -------
@@ -280,6 +281,8 @@ class Space(Numbering):
         jumps = np.empty(rest_kinks.size)
         inner = self.n_elements - 1
         np.divide(np.abs(y[1, :-1] - y[0, 1:]), np.minimum(size[1, :-1], size[0, 1:]) + 1e-300, out=jumps[:inner])
+        for k in self.breaks:  # the stretch may jump there, and the direction not
+            jumps[k - 1] = abs(y[1, k - 1] / (size[1, k - 1] + 1e-300) - y[0, k] / (size[0, k] + 1e-300))
         for k, end in enumerate(poles):
             jumps[inner + k] = 2 * abs(y[end].imag) / (size[end] + 1e-300)
         jumps -= rest_kinks
@@ -329,8 +332,14 @@ class Space(Numbering):
         points = np.concatenate([gauss[:, None] * np.ones_like(unit), 1 + gauss[:, None] * size[left + 1] / unit])
         weights = lagrange(points, (ends - ends[left]) / unit)
         at_ends = np.einsum("gn,fgn->fn", weights, np.concatenate([at_gauss[:, :, left], at_gauss[:, :, left + 1]], axis=1))
+        first, last = at_ends[:, :-1], at_ends[:, 1:]
+        if self.breaks:  # there the membrane itself may have two slopes
+            first, last = first.copy(), last.copy()
+            alone = lagrange(gauss[:, None] * np.ones(2), np.array([0.0, 1.0]))
+            for k in self.breaks:
+                first[:, k], last[:, k - 1] = at_gauss[:, :, k] @ alone[:, 0], at_gauss[:, :, k - 1] @ alone[:, 1]
         nodes = np.concatenate([[0.0], gauss, [1.0]])
-        values = np.concatenate([at_ends[:, None, :-1], at_gauss, at_ends[:, None, 1:]], axis=1)[:, :, element]
+        values = np.concatenate([first[:, None], at_gauss, last[:, None]], axis=1)[:, :, element]
         u_s, w_s = np.einsum("gn,fgn->fn", lagrange(np.repeat(nodes[:, None], xi.size, axis=1), xi), values)
         if self.lift is not None:
             lift = self.lift.at(self.mesh, np.asarray(s, dtype=float))

@@ -41,7 +41,12 @@ class CompiledKernels:
 
     def elements(self, space: Space, point: PointFunction) -> Elements:
         tape = point.tape(self.module.OPERATIONS)
-        return self._otherwise.elements(space, point) if tape is None else CompiledElements(self.module, space, point.data, tape)
+        # the sources know two parameters
+        return (
+            self._otherwise.elements(space, point)
+            if tape is None or tape[3] != 2
+            else CompiledElements(self.module, space, point.data, tape)
+        )
 
     def factor(self, band: Array) -> CompiledFactor:
         return CompiledFactor(self.module.Factor(np.ascontiguousarray(band.T), band.shape[1], (band.shape[0] - 1) // 3))
@@ -94,7 +99,7 @@ class CompiledElements:
         self.native.at_quadrature(x, local)
         return local
 
-    def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
+    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> tuple[float, float, float, bool, Array, Array]:
         forces, densities = np.empty((3, self._n_free)), np.empty((N_DENSITIES, self._n_points))
         elastic, magnetic, volume, finite = self.native.evaluate(x, pressure, factor, forces, densities)
         return elastic, magnetic, volume, finite, forces, densities

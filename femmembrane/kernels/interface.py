@@ -60,8 +60,9 @@ class Elements(Protocol):
     def at_quadrature(self, x: Array) -> Array:
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
 
-    def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
-        """Elastic and magnetic energy, volume, whether all derivatives are numbers, the forces, and the densities.
+    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> tuple[float, float, float, bool, Array, Array]:
+        """Elastic and magnetic energy, volume, whether all derivatives are numbers, the forces, and the densities. ``more`` are further
+        parameters of the point function, if it has any.
 
         Returns
         -------

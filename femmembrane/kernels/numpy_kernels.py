@@ -55,8 +55,8 @@ class NumpyElements:
     def at_quadrature(self, x: Array) -> Array:
         return self._space.at_quadrature(x)
 
-    def evaluate(self, x: Array, pressure: float, factor: float) -> tuple[float, float, float, bool, Array, Array]:
-        out = self._point.replay(self._space.at_quadrature(x), np.array([pressure, factor]))
+    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> tuple[float, float, float, bool, Array, Array]:
+        out = self._point.replay(self._space.at_quadrature(x), np.array([pressure, factor, *more]))
         densities = out[N_SUMS:]
         with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy the answer is NaN, which the caller judges
             elastic, magnetic, volume = out[:N_SUMS].sum(axis=1).tolist()

@@ -109,8 +109,3 @@ def cauchy_stress(law: Material, e1: Any, e2: Any) -> tuple[Any, Any]:
         return s1, s2
     volume = ratio(e1, e2)
     return s1 / volume, s2 / volume
-
-
-def strain_energy(material: Material, tension_field: bool) -> Material:
-    """The strain energy that a membrane follows: the material's own, or its relaxation."""
-    return TensionField(material) if tension_field else material

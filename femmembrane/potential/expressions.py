@@ -22,7 +22,7 @@ from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, hub_density, lidded_volume_density, over_projection, over_reference, volume_density, wall_density
 from ..physics.magnetics import Source, magnetic_energy_density
 from ..physics.magnetisation import Magnetisation, remanence_column
-from ..physics.tension_field import strain_energy
+from ..physics.response import ELECTRODE, response_of, squared
 from ..threads import Guard
 from .magnetic import point_energy
 from .nearby import Nearby
@@ -61,7 +61,8 @@ def point_expressions(
     """
     data = ca.SX.sym("data", len(columns))
     local = ca.SX.sym("local", 4)
-    parameters = ca.SX.sym("parameters", 2)
+    charged = scene.electricity is not None and scene.electricity.total_charge is not None
+    parameters = ca.SX.sym("parameters", 3 if charged else 2)
     flat = "Z" not in columns
     R, R_x, weight, Z, Z_x = (data[columns.index(c)] if c in columns else ca.SX(0) for c in ("R", "R_x", "weight", "Z", "Z_x"))
     own_w, own_w_x = local[2], local[3]
@@ -71,11 +72,12 @@ def point_expressions(
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
     if "thickness" in columns:
         area = area * data[columns.index("thickness")]  # all that is integrated over it belongs to the bulk of the sheet
-    material = strain_energy(scene.material, scene.tension_field)
+    material = response_of(scene, electric_square(scene, data, columns, parameters))
     stress, tangent = response_expressions(material, ca.vertcat(e1, e2))
     modulus = data[columns.index("modulus")] if "modulus" in columns else None
     if modulus is not None:
         stress, tangent = modulus * stress, modulus * tangent
+    bulk = area if modulus is None else area * modulus
     # the chain rule through closed-form stresses keeps digits that differentiating the energy would lose at small strain; written out, it
     # takes half the operations
     slopes = ca.jacobian(ca.vertcat(e1, e2), local)
@@ -112,15 +114,26 @@ def point_expressions(
         second, first = ca.hessian(load, local)
         gradient, hessian = gradient + first, hessian + second
     return (data, local, parameters), {
-        "elastic": (area if modulus is None else area * modulus) * material.energy(e1, e2),
+        "elastic": bulk * material.energy(e1, e2),
         "magnetic": magnetic,
         "load": load,
+        **({} if scene.electricity is None else {"electric": bulk * material.electric_energy(e1, e2)}),  # type: ignore[attr-defined]
         "volume": volume,
         "gradient": gradient,
         "hessian": hessian,
         "volume_gradient": ca.gradient(volume, local),
         "stress": stress,
     }
+
+
+def electric_square(scene: Scene, data: ca.SX, columns: Sequence[str], parameters: ca.SX) -> Any:
+    """The local square of voltage or charge, with the factor on sources and loads; None without. With a total charge that of the voltage is
+    the third parameter.
+    """
+    if scene.electricity is None:
+        return None
+    whole = parameters[2] if scene.electricity.total_charge is not None else parameters[1] * squared(scene.electricity)
+    return whole * data[columns.index(ELECTRODE)] if ELECTRODE in columns else whole
 
 
 def response_expressions(material: Material, strains: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -14,7 +14,9 @@ from ..errors import InputError
 from ..kernels.interface import Array, Elements
 from ..physics.magnetics import swept
 from ..physics.magnetisation import Magnetisation, sources_that_act
+from ..physics.response import squared
 from ..threads import cached_property
+from .charge import Charged
 from .expressions import BUILDING, casadi_answers_numpy
 from .potential import Evaluation, Potential, potential_of, require_elements
 from .replay import Replay
@@ -75,12 +77,22 @@ class Family(Potential):
             member = vary(number)
             super().__init__(member, quadrature)
         self.moves = hasattr(member, "lifted")
+        self.electric = self.scene.electricity  # of the family: with the number as a symbol, or another than that of the scene below
+        self._vary = vary
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         self.magnetisation = Magnetisation.of(scene) if scene.sources else None
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
         self.terms = {name: ca.substitute(self.terms[name], old, new) for name in names}
+
+    def square(self, x: Array, factor: float = 1.0) -> float | None:
+        if self.electric is None:
+            return None
+        return super().square(x, factor) if self.charged is not None else float(squared(self._vary(factor).electricity))
+
+    def charge_squared(self, factor: float) -> float:
+        return float(self._vary(factor).electricity.total_charge) ** 2
 
     def member(self, number: float) -> Member:
         """The potential of the scene that has a value of the number. Nothing is built for it; the last ones are kept.
@@ -138,17 +150,25 @@ class Family(Potential):
 
     def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
         """Derivative of E' - P V' with respect to the number, shape (n_free,)."""
-        rows = self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number]))[:4]
-        return self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+        rows = self._number_rows(x, pressure, number)[:4]
+        own = self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
+        return own if self.charged is None else own + self.charged.number_derivative(x, number)
+
+    def _number_rows(self, x: Array, pressure: float, number: float) -> Array:
+        more = [] if self.charged is None else [self.charged.square(x, number)]
+        return self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number, *more]))
 
     def volume_derivative(self, x: Array, number: float) -> float:
         """Derivative of the volume with respect to the number: zero unless that moves the ends of the membrane."""
         if not self.moves:
             return 0.0
-        return float(self._number_kernel(self.space.at_quadrature(x), np.array([0.0, number]))[4].sum())
+        return float(self._number_rows(x, 0.0, number)[4].sum())
 
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
+        if self.charged is not None:
+            allowed = "a voltage is allowed, whose folds are local: a total charge couples all points of the membrane"
+            raise InputError("electric.total_charge", self.charged.total, allowed)
         space, ne = self.space, self.space.n_elements
         local = np.concatenate([space.at_quadrature(x), space.at_quadrature(mode)])
         out = self._fold_kernel(local, np.array([pressure, number, q]))
@@ -193,8 +213,18 @@ class Member(Potential):
         """As :meth:`.Potential.evaluate`; with weaker sources it is the scene's own potential that answers."""
         if magnetic != 1.0:
             return potential_of(self.scene).evaluate(x, pressure, magnetic)
-        elements = self.elements
-        return Evaluation(x, *elements.evaluate(np.ascontiguousarray(x, dtype=float), pressure, self.number), self, elements, magnetic)
+        return self._evaluated(x, pressure, self.number, magnetic)
+
+    @property
+    def charged(self) -> Charged | None:
+        """Those of the family, which know the number."""
+        return self.family.charged
+
+    def square(self, x: Array, factor: float = 1.0) -> float | None:
+        return self.family.square(x, self.number) if factor == 1.0 else potential_of(self.scene).square(x, factor)
+
+    def electric_energy(self, x: Array, factor: float = 1.0) -> float:
+        return self.family.electric_energy(x, self.number) if factor == 1.0 else potential_of(self.scene).electric_energy(x, factor)
 
     def came_through_source(self, x: Array, before: Member, x_before: Array) -> bool:
         """Whether the membrane went through a source on the way from a state of another member, where that source stood elsewhere.

@@ -17,20 +17,24 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Step
+from ..kernels.bordered import BorderedFactor, SpringFactor
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Factor, Step
 from ..physics.along import Along
+from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, on_hubs, over_reference
 from ..physics.magnetics import swept
 from ..physics.magnetisation import Magnetisation, position_energy_density, remanence_column, sources_that_act
+from ..physics.response import ELECTRODE, local_square, response_columns, response_of, squared
 from ..physics.sheet import Sheet
-from ..physics.tension_field import strain_energy
 from ..threads import cached_property
+from .charge import Charged
 from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .magnetic import wave_function
 from .nearby import Nearby
 from .replay import PointProgram, Replay, at_points
 
 if TYPE_CHECKING:
+    from ..physics.electric import Electric
     from ..physics.materials import Material
     from ..scene import Scene
 
@@ -47,11 +51,13 @@ class Evaluation:
         Whether all derivatives are numbers: outside the domain of the energy they are not.
     elements : Elements
         The kernels that answered.
+    spring : ndarray, shape (n_free,), or None
+        a, where the second derivatives are the band plus a a^T: with a total charge, which couples all points.
     """
 
     __slots__ = (
         *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
-        *("potential", "elements", "factor", "_forces", "_densities", "_band", "_negative", "_known"),
+        *("potential", "elements", "factor", "spring", "_forces", "_densities", "_band", "_negative", "_known"),
     )
 
     def __init__(
@@ -66,9 +72,11 @@ class Evaluation:
         potential: Potential,
         elements: Elements,
         factor: float,
+        spring: Array | None = None,
     ) -> None:
         self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
         self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
+        self.spring = spring
         self._band: Array | None = None
         self._negative: int | None = None
         self._known: dict[str, float] | None = None
@@ -110,24 +118,42 @@ class Evaluation:
 
     @property
     def band(self) -> Array:
-        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free): assembled when first asked for, as not every state needs it."""
+        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free), less what the :attr:`spring` adds: assembled when first asked for,
+        as not every state needs it.
+        """
         if self._band is None:
             self._band = self.elements.assemble(self._densities)
         return self._band
 
     @property
     def negative(self) -> int:
-        """Number of negative eigenvalues of :attr:`band`: counted once, as two neighbouring steps of a branch ask for it."""
+        """Number of negative eigenvalues of E'' - P V'': counted once, as two neighbouring steps of a branch ask for it."""
         if self._negative is None:
-            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, None, 0.0)
+            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, self.spring, 1.0)
         return self._negative
+
+    def factors(self) -> Factor:
+        """Factors of E'' - P V''."""
+        factor = kernels().factor(self.band)
+        return factor if self.spring is None else SpringFactor(factor, self.spring)
+
+    def inner(self, x: Array, y: Array) -> float:
+        """x . (E'' - P V'') y."""
+        own = kernels().inner(self.band, self.potential.space.half_bandwidth, x, y)
+        return own if self.spring is None else own + float(self.spring @ x) * float(self.spring @ y)
 
     def border(self, row: Array, corner: float) -> Border:
         """Factors of :attr:`band` with the column -V' and the row of a control."""
+        if self.spring is not None:
+            return BorderedFactor(self.factors(), -self.volume_gradient, row, corner)
         return self.elements.border(self._densities, self.volume_gradient, row, corner)
 
     def step(self, row: Array, corner: float, gap: float) -> Step:
         """The bordered Newton step at x and its factors, see :meth:`.Elements.step`."""
+        if self.spring is not None:
+            border, largest = self.border(row, corner), self.elements.largest
+            dx, dp = border.solve(self.unbalanced, -gap)
+            return border, dx, dp, largest(dx), largest(self.x)
         return self.elements.step(self._densities, self._forces, row, corner, gap, self.x)
 
     def force_scale(self, pressure: float) -> tuple[float, float]:
@@ -140,8 +166,13 @@ class Evaluation:
         return self.potential.load_energy(self.x, self.factor)
 
     @property
+    def electric_energy(self) -> float:
+        """Energy of voltage or charge at x, with the 2 pi; computed when asked for."""
+        return self.potential.electric_energy(self.x, self.factor)
+
+    @property
     def energy(self) -> float:
-        return self.elastic_energy + self.magnetic_energy + self.load_energy
+        return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
 
 
 class Potential:
@@ -198,6 +229,7 @@ class Potential:
             columns |= self.sheet.columns(space.R, space.Z, space.s)
         if self.magnetisation is not None and isinstance(self.magnetisation.remanence, Along):
             columns["remanence"] = remanence_column(self.magnetisation, space.R, space.Z, space.s, space.side)
+        columns |= response_columns(scene, space.R, space.Z, space.s)
         if space.lift is not None:
             columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
@@ -209,17 +241,47 @@ class Potential:
     @property
     def surrounded(self) -> bool:
         """Whether anything but the pressure acts on the membrane. Otherwise the flat unloaded state is an equilibrium without stiffness."""
-        return bool(self.sources or self.loads)
+        return bool(self.sources or self.loads or self.electric)
 
     @property
     def prestressed(self) -> bool:
         """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
         return bool(getattr(self.scene.material, "prestressed", False))
 
-    @property
-    def material(self) -> Material:
-        """The strain energy of the membrane: the scene's material, or its tension field."""
-        return strain_energy(self.scene.material, self.scene.tension_field)
+    @cached_property
+    def electric(self) -> Electric | None:
+        """Voltage or charge of the scene without units; None without."""
+        return self.scene.electricity
+
+    def square(self, x: Array, factor: float = 1.0) -> float | None:
+        """phi^2, or the frozen q^2, of a state; None without voltage and charge. ``factor`` as in :meth:`evaluate`."""
+        if self.electric is None:
+            return None
+        return self.charged.square(x, factor) if self.charged is not None else factor * float(squared(self.electric))
+
+    def charge_squared(self, factor: float) -> float:
+        """Q^2 of a total charge. ``factor`` as in :meth:`evaluate`."""
+        return factor * float(cast("Electric", self.scene.electricity).total_charge or 0.0) ** 2
+
+    @cached_property
+    def charged(self) -> Charged | None:
+        """The electrodes with a total charge; None without."""
+        return None if self.electric is None or self.electric.total_charge is None else Charged(self)
+
+    def local_square(self, x: Array, R: Array, Z: Array, s: Array, factor: float = 1.0) -> Array | None:
+        """See :func:`.response.local_square`; of the state x."""
+        found: Array | None = local_square(self.scene, R, Z, s, self.square(x, factor))
+        return found
+
+    def response_at(self, x: Array, R: Array, Z: Array, s: Array, factor: float = 1.0) -> Material:
+        """How the membrane answers strains at points of the meridian in the state x: per thickness, in units of the local modulus."""
+        return response_of(self.scene, self.local_square(x, R, Z, s, factor))
+
+    @cached_property
+    def electrode(self) -> Array | None:
+        """The column of that name of :func:`.response_columns` at the quadrature points; None where all points are alike."""
+        space = self.space
+        return response_columns(self.scene, space.R, space.Z, space.s).get(ELECTRODE)
 
     @cached_property
     def bulk(self) -> Array:
@@ -282,19 +344,72 @@ class Potential:
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
-        elements = self.elements
-        return Evaluation(x, *elements.evaluate(np.ascontiguousarray(x, dtype=float), pressure, magnetic), self, elements, magnetic)
+        return self._evaluated(x, pressure, magnetic, magnetic)
+
+    def _evaluated(self, x: Array, pressure: float, slot: float, magnetic: float) -> Evaluation:
+        """:meth:`evaluate` with what the point function takes for the factor on sources and loads."""
+        elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
+        if self.charged is None:
+            return Evaluation(x, *elements.evaluate(x, pressure, slot), self, elements, magnetic)
+        square, spring = self.charged.at(x, slot)
+        return Evaluation(x, *elements.evaluate(x, pressure, slot, square), self, elements, magnetic, spring)
 
     def load_energy(self, x: Array, factor: float = 1.0) -> float:
         """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""
         if not self.loads:
             return 0.0
-        return float(self._load_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+        parameters = np.array([0.0, factor] if self.charged is None else [0.0, factor, 0.0])  # a voltage is no load
+        return float(self._load_kernel(self.space.at_quadrature(x), parameters).sum())
 
     @cached_property
     @BUILDING
     def _load_kernel(self) -> Replay:
         return Replay(ca.Function("load", list(self.symbols), [self.terms["load"]], {"cse": True}), self.point_data)
+
+    def electric_energy(self, x: Array, factor: float = 1.0) -> float:
+        """Energy of voltage or charge at the free coefficients x, with the 2 pi; 0 without. ``factor`` as in :meth:`evaluate`."""
+        if self.electric is None:
+            return 0.0
+        if self.charged is not None:
+            return self.charged.energy(x, factor)
+        return float(self._electric_kernel(self.space.at_quadrature(x), np.array([0.0, factor])).sum())
+
+    def _field_squared(self, x: Array, factor: float = 1.0) -> Array:
+        """Square of the true field at the quadrature points."""
+        space, sheet = self.space, self.sheet
+        u, u_x, _, w_x = space.displacement_at_quadrature(x)
+        strains = hencky_strains(space.R, space.R_x, space.Z_x, u, u_x, w_x)
+        response: Any = self.response_at(x, space.R, space.Z, space.s, factor)
+        modulus = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[1]
+        square: Array = response.field_squared(*strains) * modulus
+        return square
+
+    def largest_field(self, x: Array, factor: float = 1.0) -> float:
+        """Largest true field at the quadrature points."""
+        return math.sqrt(float(self._field_squared(x, factor).max()))
+
+    def electric_quantities(self, x: Array) -> dict[str, float]:
+        """Voltage, charge, capacitance and the largest true field of a state; zeros without voltage and charge, and NaN for what a frozen
+        charge does not have.
+        """
+        names = ("voltage", "charge", "capacitance", "electric_field")
+        if self.electric is None:
+            return dict.fromkeys(names, 0.0)
+        space, sheet = self.space, self.sheet
+        thickness = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[0]
+        square = self._field_squared(x)
+        largest = float(np.sqrt(square.max()))
+        if self.electric.frozen_charge is not None:
+            covered = float((space.area_weights * self.electric.covers(space.s)).sum())
+            return dict(zip(names, (np.nan, self.electric.frozen_charge * covered, np.nan, largest), strict=True))
+        phi = math.sqrt(self.square(x) or 0.0)
+        capacitance = float((space.area_weights * thickness * square).sum()) / phi**2
+        return dict(zip(names, (phi, phi * capacitance, capacitance, largest), strict=True))
+
+    @cached_property
+    @BUILDING
+    def _electric_kernel(self) -> Replay:
+        return Replay(ca.Function("electric", list(self.symbols), [self.terms["electric"]], {"cse": True}), self.point_data)
 
     @cached_property
     def _circles(self) -> tuple[Any, ...]:
@@ -339,22 +454,29 @@ class Potential:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
         return evaluation.force_scale(pressure)
 
-    def response(self, e1: Array, e2: Array) -> Array:
-        """Principal mechanical stresses and their derivatives with respect to the Hencky strains, where the modulus is 1.
+    def response(self, e1: Array, e2: Array, square: Array | None = None) -> Array:
+        """Principal stresses that the energy feels and their derivatives with respect to the Hencky strains, where the modulus is 1.
+
+        Parameters
+        ----------
+        e1, e2 : ndarray
+        square : ndarray, optional
+            :meth:`local_square` at the points, with voltage or charge.
 
         Returns
         -------
         ndarray, shape (5, n)
             s_1, s_2, ds_1/de_1, ds_1/de_2, ds_2/de_2 in units of mu.
         """
-        return at_points(self._response_function, e1, e2)
+        return at_points(self._response_function, e1, e2, *([] if square is None else [square]))
 
     @cached_property
     @BUILDING
     def _response_function(self) -> ca.Function:
-        e = ca.SX.sym("e", 2)
+        e = ca.SX.sym("e", 2 if self.electric is None else 3)
         with casadi_answers_numpy():
-            stress, tangent = response_expressions(self.material, e)
+            response = response_of(self.scene, None if self.electric is None else e[2])
+            stress, tangent = response_expressions(response, e)
         return point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
 
     def field_energy(self, rho: Array, eta: Array) -> Array:
@@ -424,7 +546,8 @@ def potential_of(scene: Scene) -> Potential:
         While the mesh of the scene is still to be chosen.
     """
     require_elements(scene)
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), radius_to_thickness=1.0, scales=None))
+    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": scene.electricity}
+    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain))
 
 
 def require_elements(scene: Scene) -> None:

@@ -64,6 +64,8 @@ class Equilibrium:
         The enclosed gas that holds it, when found under gas control.
     load_energy : float
         Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without loads.
+    electric_energy : float
+        Energy of a voltage (with what its source gives) or of a charge, in the same units; 0 without.
 
     Examples
     --------
@@ -89,12 +91,48 @@ class Equilibrium:
     seconds: float = field(default=0.0, repr=False)
     gas: Gas | None = field(default=None, repr=False)
     load_energy: float = field(default=0.0, repr=False)
+    electric_energy: float = field(default=0.0, repr=False)
     _answers: dict[Key, Any] = field(default_factory=dict, repr=False)
 
     @property
     def energy(self) -> float:
-        """Elastic, magnetic and load energy."""
-        return self.elastic_energy + self.magnetic_energy + self.load_energy
+        """Elastic, magnetic, load and electric energy."""
+        return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
+
+    @property
+    def voltage(self) -> float:
+        """phi between the electrodes, the scene's own or Q/C; 0 without, and NaN with a frozen charge, where there is not one voltage."""
+        return self._electric["voltage"]
+
+    @property
+    def charge(self) -> float:
+        """Q on the electrodes over R0^2 sqrt(eps mu); 0 without."""
+        return self._electric["charge"]
+
+    @property
+    def capacitance(self) -> float:
+        """C = Int (lambda_1 lambda_2)^2/t dA of the electrodes over eps R0^2/T, with the 2 pi; 0 without, NaN with a frozen charge."""
+        return self._electric["capacitance"]
+
+    @property
+    def electric_field(self) -> float:
+        """Largest true field at the quadrature points over sqrt(mu/eps); 0 without."""
+        return self._electric["electric_field"]
+
+    @property
+    def breakdown_ratio(self) -> float:
+        """Largest true field over the breakdown field; NaN where the scene gives none."""
+        electricity = self.scene.electricity
+        return np.nan if electricity is None or electricity.breakdown is None else self.electric_field / electricity.breakdown
+
+    @property
+    def _electric(self) -> dict[str, float]:
+        own = self.scene.electric
+        if own is not None and self.scene.electricity is None:  # no voltage or charge on electrodes that have a capacitance
+            plain = replace(own.plain(self.scene.scales), **{own.load: 1.0})
+            found = self.in_scene(self.scene.replace(electric=plain, scales=None))._electric
+            return {**dict.fromkeys(found, 0.0), "capacitance": found["capacitance"]}
+        return self.remembered(("electric",), lambda: self.potential.electric_quantities(self.state))
 
     @property
     def potential(self) -> Potential:
@@ -186,7 +224,7 @@ class Equilibrium:
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
         return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None) -> Verdict:
+    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
         Parameters
@@ -198,6 +236,9 @@ class Equilibrium:
         gas : Gas, optional
             For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found, or the amount in the chamber of
             the scene that holds it.
+        electric : {"voltage", "charge"}, optional
+            What is held of the electrodes: the voltage, or the total charge, which stiffens axisymmetric perturbations. Default: what the
+            scene gives.
 
         Raises
         ------
@@ -212,10 +253,25 @@ class Equilibrium:
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
-        key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
+        key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
         if control == "gas" and gas is None:
             gas = self.enclosed
-        return self.remembered(key, lambda: self._judged(control, azimuthal, gas))
+        potential = self.potential if electric is None else self._holding(electric)
+        key = key if potential is self.potential else (*key, electric)
+        return self.remembered(key, lambda: self._judged(potential, control, azimuthal, gas))
+
+    def _holding(self, electric: str) -> Potential:
+        """The potential with the same forces in this state that holds the voltage, or the total charge."""
+        from ..potential import potential_of
+
+        choice("electric", electric, ("voltage", "charge"))
+        own = self.scene.electricity
+        if own is None or own.frozen_charge is not None:
+            raise InputError("electric", electric, "allowed with electrodes that have a voltage or a total charge")
+        name, number = ("voltage", self.voltage) if electric == "voltage" else ("total_charge", self.charge)
+        if own.load == name:
+            return self.potential
+        return potential_of(self.scene.replace(electric=replace(own, **{own.load: None, name: number})))
 
     @property
     def enclosed(self) -> Gas | None:
@@ -228,10 +284,10 @@ class Equilibrium:
         return door.gas(amount, chamber.volume, chamber.atmosphere) if amount > 0 and self.volume > -chamber.volume else None
 
     @one_thread
-    def _judged(self, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
-        evaluation = self.potential.evaluate(self.state, self.pressure)
+    def _judged(self, potential: Potential, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+        evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
-        return door.checked_verdict(self.potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+        return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:

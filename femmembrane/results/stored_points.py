@@ -28,7 +28,17 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SCALARS = ("pressure", "volume", "center_height", "elastic_energy", "magnetic_energy", "load_energy", "residual", "seconds")
+_SCALARS = (
+    "pressure",
+    "volume",
+    "center_height",
+    "elastic_energy",
+    "magnetic_energy",
+    "load_energy",
+    "electric_energy",
+    "residual",
+    "seconds",
+)
 _SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
 #: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
 SPECIAL, LIMIT = "special_", "limit_"
@@ -38,7 +48,7 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
     """What :func:`equilibria_of` needs to build the records again; ``width`` is the length of their states."""
     absent = {
         name
-        for name, kind in (("magnetic_energy", "sources"), ("load_energy", "loads"))
+        for name, kind in (("magnetic_energy", "sources"), ("load_energy", "loads"), ("electric_energy", "electric"))
         if not any(getattr(e.scene, kind) for e in equilibria)
     }
     scalars = [name for name in _SCALARS if name not in absent]
@@ -55,7 +65,7 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
     count = len(dataset[prefix + "status"])
     states = _finite(dataset, prefix + "state", count, _unknowns(scene) if count else dataset.sizes["coefficient"])
     states.flags.writeable = False
-    present = {"magnetic_energy": bool(scene.sources), "load_energy": bool(scene.loads)}
+    present = {"magnetic_energy": bool(scene.sources), "load_energy": bool(scene.loads), "electric_energy": scene.electric is not None}
     needed = [name for name in _SCALARS if (count and present.get(name, True)) or prefix + name in dataset]
     scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
     scalars.setdefault("magnetic_energy", [0.0] * count)

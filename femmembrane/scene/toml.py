@@ -11,6 +11,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [[load]]    kind, ...        a class of LOADS and its arguments
     [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
                 file, ...        or a mesh file and what else FILE_KEYS lists; the scene keeps its points
+    [electric]                   Electric
     [effects]                    attributes of Scene that are on or off
     [run]                        Run
     [analysis]                   Analysis
@@ -42,6 +43,7 @@ from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
 from ..physics.chamber import Chamber
+from ..physics.electric import Electric
 from ..physics.hooke import Hooke
 from ..physics.invariant import ArrudaBoyce, ExtendedTube, Fung, Gent, LopezPamies, Yeoh
 from ..physics.invariants import GentGent, Polynomial, VerondaWestmann
@@ -104,6 +106,8 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "mesh": ("degree",),
     "effects": ("tension_field", "demagnetization"),
 }
+#: arguments of Electric whose keys are words that Python keeps for itself, or stand beside one
+ELECTRIC_KEYS = {"start": "from", "stop": "to"}
 #: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
 MAX_BYTES = 2**25
 #: other sources of an argument without a default, for the message when it is missing
@@ -188,6 +192,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         title=data.get("title", ""),
         scales=scales,
         chamber=_build("chamber", Chamber, tables["chamber"]) if "chamber" in data else None,
+        electric=_electric(tables["electric"]) if "electric" in data else None,
         **arguments,
     )
 
@@ -211,6 +216,7 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
         "scales": _arguments(scene.scales) if scene.scales else {},
         "chamber": _arguments(scene.chamber) if scene.chamber else {},
+        "electric": {} if scene.electric is None else {ELECTRIC_KEYS.get(k, k): v for k, v in _arguments(scene.electric).items()},
     }
     for name in ("thickness", "modulus", "remanence"):
         if callable(getattr(getattr(scene, name), "given", None)):
@@ -239,7 +245,14 @@ def _known_keys() -> dict[str, set[str]]:
     keys["source"] = {"kind", "remanence"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
     keys["mesh"] |= {"shape", "file", "unit", *FILE_KEYS} | arguments(*SHAPES.values())
+    keys["electric"] = {ELECTRIC_KEYS.get(name, name) for name in arguments(Electric)}
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales), "chamber": arguments(Chamber)}
+
+
+def _electric(table: Mapping[str, Any]) -> Electric:
+    _refuse_unknown("electric", table, tuple(sorted(_known_keys()["electric"])))
+    names = {key: name for name, key in ELECTRIC_KEYS.items()}
+    return Electric(**{names.get(key, key): value for key, value in table.items()})
 
 
 def _refuse_unknown(path: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:

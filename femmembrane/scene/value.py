@@ -21,6 +21,7 @@ from ..errors import InputError, unknown_name
 from ..memory import SMALL, require
 from ..physics.along import Along
 from ..physics.chamber import Chamber
+from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source
 from ..physics.materials import Material
@@ -94,6 +95,8 @@ class Scene:
         Whether it is carried by the deformation gradient (left out) or by the rotation alone (:mod:`~femmembrane.physics.magnetisation`).
     chamber : Chamber, optional
         The chamber of gas behind the membrane, for runs by amounts of gas and verdicts at a held amount.
+    electric : Electric, optional
+        A voltage or a charge on the faces of the membrane. Without one nothing electric is built.
 
     Raises
     ------
@@ -135,6 +138,7 @@ class Scene:
     remanence_direction: str | None = None
     remanence_transport: str | None = None
     chamber: Chamber | None = None
+    electric: Electric | None = None
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -152,6 +156,10 @@ class Scene:
                 load,
                 ("over_reference", "over_projection", "on_hubs", "sees", "acts"),
                 "a load is allowed, such as Weight(weight=...)",
+            )
+        if self.electric is not None:
+            _check_interface(
+                "electric", self.electric, ("voltage", "plain", "covers"), "an Electric is allowed, such as Electric(voltage=0.3)"
             )
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _check_interface("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
@@ -175,6 +183,7 @@ class Scene:
         self._check_size()
         self._check_sheet()
         lift = lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
+        self._check_electric()
         self._check_sources(lift)
         self._check_hubs()
         self._check_run()
@@ -212,6 +221,15 @@ class Scene:
             factor = getattr(self, key)
             if factor is not None:
                 factor.checked(f"membrane.{key}", *self.mesh.position(s), s)
+
+    def _check_electric(self) -> None:
+        if self.electric is not None:
+            self.electric.plain(self.scales)  # refuses units without scales
+            ends = self.mesh.breakpoints()
+            self.electric.check(float(ends[0]), float(ends[-1]))
+            if hasattr(self.material, "volume_ratio"):
+                allowed = "an incompressible material is allowed with a voltage or a charge, whose field follows from a constant volume"
+                raise InputError("material.kind", type(self.material).__name__, allowed)
 
     def _check_sources(self, lift: Lift | None) -> None:
         ends = self.mesh.breakpoints()
@@ -261,9 +279,27 @@ class Scene:
 
     @property
     def element_ends(self) -> tuple[float, ...]:
-        """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet."""
+        """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet, and ends of electrodes."""
         factors = (self.thickness, self.modulus, self.remanence)
-        return tuple(sorted({s for factor in factors if isinstance(factor, Along) for s in factor.ends}))
+        places = {s for factor in factors if isinstance(factor, Along) for s in factor.ends}
+        if self.electric is not None:  # with a number of 0 too: it may be one of a family
+            places |= {*self.electric.ends} - {*self.mesh.breakpoints()[[0, -1]]}
+        return tuple(sorted(places))
+
+    @property
+    def electricity(self) -> Electric | None:
+        """Voltage or charge without units; None where there is none, or its number is 0."""
+        if self.electric is None:
+            return None
+        plain = self.electric.plain(self.scales)
+        if not getattr(plain, plain.load):
+            return None
+        if not plain.ends:
+            return plain
+        ends = self.mesh.breakpoints()[[0, -1]]
+        return dataclasses.replace(
+            plain, start=None if plain.start == ends[0] else plain.start, stop=None if plain.stop == ends[1] else plain.stop
+        )
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.

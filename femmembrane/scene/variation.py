@@ -3,6 +3,7 @@
 ======================== ==================================================================================================
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
+``electric.NAME``        what is given of ``electric.voltage``, ``electric.total_charge`` and ``electric.frozen_charge``
 ``membrane.susceptibility``  chi; ``membrane.saturation`` and ``membrane.remanence``, where they are numbers
 ``membrane.prestretch``  p of a flat disc or annulus, or of a tube
 ``chamber.NAME``         volume or atmosphere of the chamber of gas
@@ -40,6 +41,8 @@ _TINY = 1e-300
 MAGNETISATION = ("demagnetization", "saturation", "remanence", "remanence_direction", "remanence_transport")
 #: parts of a scene that are lists, by their names
 _LISTS = {"source": "sources", "load": "loads"}
+#: parts of a scene that are objects of their own
+_OBJECTS = ("electric", "chamber")
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return float(getattr(self.scene, rest) or 0.0)
-        if part == "chamber":
-            return float(getattr(self.scene.chamber, rest))
+        if part in _OBJECTS:
+            return float(getattr(getattr(self.scene, part), rest))
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
         owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
@@ -95,9 +98,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return self.scene.replace(**{rest: value})
-        if part == "chamber":
-            chamber: Any = self.scene.chamber
-            return self.scene.replace(chamber=dataclasses.replace(chamber, **{rest: value}))
+        if part in _OBJECTS:
+            return self.scene.replace(**{part: dataclasses.replace(getattr(self.scene, part), **{rest: value})})
         if part == "material":
             material: Any = self.scene.material
             if rest.startswith("mu."):
@@ -120,11 +122,15 @@ class Parameter:
         material: Any = scene.material
         sources: tuple[Any, ...] = scene.sources
         loads: tuple[Any, ...] = scene.loads
-        susceptibility = scene.susceptibility
+        susceptibility, electricity = scene.susceptibility, scene.electricity
         magnetisation = {name: getattr(scene, name) for name in MAGNETISATION}
         lifted: dict[str, Any] = {}
         if part == "chamber":  # of the control, and of no potential
             pass
+        elif part == "electric":
+            given: Any = scene.electric
+            unit = 1.0 if given.relative_permittivity is None else given.units(scene.scales)[rest]
+            electricity = _unchecked(dataclasses.replace(given, **{rest: 1.0}).plain(scene.scales), **{rest: value / unit})
         elif rest == "prestretch":  # the lift of p is p - 1 times that of 2
             lifted = {"prestretch": 2.0, "lifted": value - 1}
         elif part == "membrane" and rest in magnetisation:
@@ -146,7 +152,7 @@ class Parameter:
                 _Scaled(_unchecked(s, strength=1.0), value) if name == "strength" else _unchecked(s, **{name: value}) for s in sources
             ]
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
-        parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility}
+        parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility, "electricity": electricity}
         kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
         return SimpleNamespace(**parts, **magnetisation, **{**{name: getattr(scene, name) for name in kept}, **lifted})
 
@@ -176,6 +182,8 @@ def names(scene: Scene) -> list[str]:
     """Names of all numbers of a scene that can be varied."""
     found = [f"source.{k}.{name}" for k, source in enumerate(scene.sources) for name in _numbers(source)]
     found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
+    if scene.electric is not None:
+        found.append(f"electric.{scene.electric.load}")
     if scene.sources:
         found.append("membrane.susceptibility")
         found += [f"membrane.{name}" for name in ("saturation", "remanence") if isinstance(getattr(scene, name), Real)]

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor as BorderedFactor
-from ..kernels.interface import Array
+from ..kernels.interface import Array, Factor
+
+if TYPE_CHECKING:
+    from ..potential import Evaluation
 
 
 class BandFactor:
     """Factors of a symmetric band matrix in LAPACK general storage, shape (3 kd + 1, n)."""
 
+    _factor: Factor
+
     def __init__(self, band: Array) -> None:
         self._factor = kernels().factor(band)
+
+    @classmethod
+    def of(cls, evaluation: Evaluation) -> BandFactor:
+        """Factors of E'' - P V'' at a state, what a spring adds to the band included."""
+        new = object.__new__(cls)
+        new._factor = evaluation.factors()
+        return new
 
     def solve(self, right: Array) -> Array:
         """Solution for one or several right-hand sides, shape (n,) or (n, k)."""
@@ -22,6 +36,26 @@ class BandFactor:
     def determinant_sign(self) -> int:
         """Sign of the determinant."""
         return self._factor.determinant_sign()
+
+
+def negative_among(evaluation: Evaluation, constraint: Array | None = None) -> int:
+    """Number of negative eigenvalues of E'' - P V'' at a state, restricted to ``constraint . x = 0`` if one is given."""
+    if constraint is None:
+        return evaluation.negative
+    kd = evaluation.potential.space.half_bandwidth
+    if evaluation.spring is None:
+        return negative_directions(evaluation.band, kd, constraint)
+    return bordered_count(evaluation.band, kd, np.column_stack([evaluation.spring, constraint]), np.array([-1.0, 0.0]))
+
+
+def bordered_count(band: Array, half_bandwidth: int, borders: Array, corners: Array) -> int:
+    """Number of negative directions of K with borders: springs a a^T/c with a corner -c < 0, and rigid constraints with a corner 0.
+
+    By Haynsworth's additivity: the inertia of K and of the dense complement of the borders, less one of each border's own.
+    """
+    schur = np.diag(corners) - borders.T @ BandFactor(band).solve(np.asfortranarray(borders))
+    own = int((corners <= 0).sum())
+    return negative_directions(band, half_bandwidth) + int((np.linalg.eigvalsh((schur + schur.T) / 2) < 0).sum()) - own
 
 
 class WideBorder:

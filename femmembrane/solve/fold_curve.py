@@ -40,7 +40,7 @@ class FoldProblem(NumberProblem):
             return borders
         evaluation = self._at_start(z).evaluation
         gradient = evaluation.volume_gradient
-        bordered, mode, q = BorderedFactor(BandFactor(evaluation.band), -gradient, -gradient, 0.0), gradient, 0.0
+        bordered, mode, q = BorderedFactor(BandFactor.of(evaluation), -gradient, -gradient, 0.0), gradient, 0.0
         for _ in range(sweeps):
             mode, q = bordered.solve(*self.unit_mode(mode, q))
         return Borders(borders.deflation, *self.unit_mode(mode, q))

@@ -205,7 +205,7 @@ class _Path:
     def _solve(self, here: Residual, row: Array, right: list[float], *, at_rest: bool = False) -> Array | None:
         """The Newton step for (R, N, row . (x, P, t)) with what the last two are to change by; ``at_rest`` leaves R as it is."""
         border = here.evaluation.volume_gradient
-        deflated = BorderedFactor(BandFactor(here.evaluation.band), border, border, 0.0)
+        deflated = BorderedFactor(BandFactor.of(here.evaluation), border, border, 0.0)
         corner = np.array([[here.corner, here.gap_t], [row[-2], row[-1]]])
         try:
             wide = WideBorder(deflated, [-border, here.force_t], [here.row, row[:-2]], corner)

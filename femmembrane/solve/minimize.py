@@ -20,7 +20,7 @@ from ..potential import Array, Evaluation, Potential
 from ..potential.expressions import BUILDING
 from ..potential.replay import vectorise
 from ..threads import Guard
-from .banded import negative_directions
+from .banded import negative_among
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, displaced
 from .state import displacement, distance
@@ -150,6 +150,11 @@ def minimize_and_verify(
     NewtonResult
         Status NOT_A_MINIMUM when forces balance but the second variation has a negative direction under this control.
     """
+    if potential.charged is not None:  # its second derivatives are full: Newton's method, and our own check
+        result = correct(potential, control, x, pressure, magnetic=magnetic, damped=True)
+        if result.status is Status.CONVERGED and not is_minimum(potential, control, result.evaluation):
+            result.status = Status.NOT_A_MINIMUM
+        return result
     evaluation = potential.evaluate(x, pressure, magnetic)
     if not np.isfinite(evaluation.energy):  # outside the domain of the energy: nothing to scale by
         return correct(potential, control, x, pressure, magnetic=magnetic)
@@ -183,7 +188,7 @@ def _on_branch_of_guess(
 def is_minimum(potential: Potential, control: Control, evaluation: Evaluation) -> bool:
     """Whether the second variation has no negative direction under volume or pressure control."""
     constraint = evaluation.volume_gradient if isinstance(control, VolumeControl) else None
-    return negative_directions(evaluation.band, potential.space.half_bandwidth, constraint) == 0
+    return negative_among(evaluation, constraint) == 0
 
 
 @lru_cache(maxsize=32)
@@ -200,7 +205,7 @@ def nlp_functions(potential: Potential) -> NlpFunctions:
     data = ca.DM(potential.point_data.T)
 
     t, (_, local_symbol, parameters) = potential.terms, potential.symbols
-    total = t["elastic"] + t["magnetic"] + t["load"] - parameters[0] * t["volume"]
+    total = t["elastic"] + t["magnetic"] + t["load"] + t.get("electric", 0.0) - parameters[0] * t["volume"]
     force = t["gradient"] - parameters[0] * t["volume_gradient"]
     curvature = t["hessian"] - parameters[0] * ca.jacobian(t["volume_gradient"], local_symbol)
 

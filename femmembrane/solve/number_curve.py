@@ -95,7 +95,7 @@ class Equations:
 
     def factorise(self) -> None:
         """Factors of [K, b; b^T, 0], the null vector that they give, and g with all derivatives."""
-        self.factor = BandFactor(self.evaluation.band)
+        self.factor = BandFactor.of(self.evaluation)
         self.deflated = BorderedFactor(self.factor, self.borders.deflation, self.borders.deflation, 0.0)
         self.null, self.null_gap = self.deflated.solve(np.zeros_like(self.force), 1.0)
         self.linearise()
@@ -223,7 +223,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
         """The mode of K closest to zero, by inverse iteration from the shape of the volume gradient."""
         equations = self._at_start(z)
         gradient = equations.evaluation.volume_gradient
-        factor, mode = BandFactor(equations.evaluation.band), gradient
+        factor, mode = BandFactor.of(equations.evaluation), gradient
         for _ in range(sweeps):
             mode = factor.solve(self.unit_mode(mode, 0.0)[0])
         deflation = self.unit_mode(mode, 0.0)[0]

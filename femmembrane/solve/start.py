@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
-from .banded import negative_directions
+from .banded import negative_among
 from .branch import BranchProblem, first_point
 from .contact import touches_source
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
@@ -242,9 +242,18 @@ def _with_fields(potential: Potential, volume: float) -> State:
         last = (error.result or [bare])[-1]
         touching = potential.distance_to_sources(last.x) < NEAR * potential.space.unit
         raise SolveError(
-            f"the sources could not be turned on to their full strength at V = {volume:.6g}; try another volume or a lower strength",
+            f"{_acting(potential)} could not be turned on to their full strength at V = {volume:.6g}; "
+            "try another volume or a lower strength",
             status=Status.DIPOLE_CONTACT if touching else Status.NO_EQUILIBRIUM,
         ) from error
+
+
+def _acting(potential: Potential) -> str:
+    """What was to be turned on, in words."""
+    if potential.electric is None:
+        return "the sources"
+    word = "voltage" if potential.electric.load == "voltage" else "charge"
+    return f"the sources and the {word}" if potential.sources else f"the {word}"
 
 
 def _inflated(potential: Potential, volume: float) -> State:
@@ -542,7 +551,7 @@ def _sound(state: State) -> bool:
 
 def _is_minimum(state: State) -> bool:
     """Whether a state is a minimum under pressure control."""
-    return negative_directions(state.evaluation.band, state.evaluation.potential.space.half_bandwidth) == 0
+    return negative_among(state.evaluation) == 0
 
 
 def _pull(potential: Potential) -> float:

@@ -42,7 +42,7 @@ class State:
     def factor(self) -> BandFactor:
         """Factors of K at x, computed when first asked for."""
         if self._factor is None:
-            self._factor = BandFactor(self.evaluation.band)
+            self._factor = BandFactor.of(self.evaluation)
         return self._factor
 
     @property

@@ -19,7 +19,7 @@ from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
-from .banded import negative_directions
+from .banded import negative_among
 from .branch import first_point
 from .controls import VolumeControl
 from .finer_space import counterpart, met_across, moved, solved_in, transferred
@@ -129,9 +129,10 @@ def _pull_at_edges(potential: Potential, state: State) -> dict[float, float]:
         if not max(beside.max(axis=1) - beside.min(axis=1)) > _PULL * scale:
             continue
         end = space.ends[[-k]]
-        (R, _), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
+        (R, Z), (R_s, Z_s) = space.mesh.position(end), space.mesh.tangent(end)
         u, u_s, _, w_s = space.displacement(state.x, end)
-        pull, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+        response = potential.response_at(state.x, R, Z, end, state.evaluation.factor)
+        pull, _ = response.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
         level = float((np.abs(R_s + u_s) / np.hypot(R_s + u_s, Z_s + w_s))[0])
         left[float(R[0])] = abs(float(pull[0])) * level / scale
     return left
@@ -217,7 +218,7 @@ def _found_again(onto: Potential, potential: Potential, state: State) -> State |
 
 def _side(potential: Potential, evaluation: Evaluation) -> int:
     """Number of negative directions at constant volume: changes at every fold in the volume."""
-    return negative_directions(evaluation.band, potential.space.half_bandwidth, evaluation.volume_gradient)
+    return negative_among(evaluation, evaluation.volume_gradient)
 
 
 def _largest_stretch(potential: Potential, x: Array) -> float:

@@ -171,7 +171,7 @@ def softest(potential: Potential, state: State) -> tuple[Array, float]:
             pair[0] = pair[0] / np.sqrt(band_inner(mass, kd, pair[0], pair[0]))
             pair[1] = pair[1] - band_inner(mass, kd, pair[0], pair[1]) * pair[0]
             pair[1] = pair[1] / np.sqrt(band_inner(mass, kd, pair[1], pair[1]))
-        projected = np.array([[band_inner(state.evaluation.band, kd, u, v) for v in pair] for u in pair])
+        projected = np.array([[state.evaluation.inner(u, v) for v in pair] for u in pair])
     if not np.isfinite(projected).all():
         raise SolveError("no displacement is the softest one there", status=Status.NOT_CONVERGED)
     stiffness, combinations = np.linalg.eigh(projected)
@@ -210,7 +210,14 @@ def _second(potential: Potential, left: BranchPoint, u: BranchPoint, v: BranchPo
     phi, direction = (space.at_quadrature(y).reshape(4, -1) for y in (left.tangent[:-1], vx))
     forward, backward = (_first(potential.evaluate(state.x + k * ux, state.pressure + k * up), phi, direction, vp) for k in (e, -e))
     terms = (forward - backward) / (2 * e)
-    return float(terms.sum()), float(np.abs(terms).sum())
+    springs = (
+        [potential.evaluate(state.x + k * ux, state.pressure + k * up).spring for k in (e, -e)]
+        if state.evaluation.spring is not None
+        else []
+    )
+    coupled = [float(spring @ left.tangent[:-1]) * float(spring @ vx) for spring in springs if spring is not None]
+    more = (coupled[0] - coupled[1]) / (2 * e) if coupled else 0.0
+    return float(terms.sum()) + more, float(np.abs(terms).sum()) + abs(more)
 
 
 def _first(evaluation: Evaluation, phi: Array, v: Array, v_pressure: float) -> Array:

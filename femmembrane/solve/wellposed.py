@@ -26,6 +26,7 @@ from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
 from .finer_space import confirmed
+from .pull_in import pulled_in
 from .state import State
 
 #: stress relative to the largest one that counts as none
@@ -49,6 +50,8 @@ class IllPosed:
         Whether it is more than this mesh alone says: False where the state was not found in finer spaces, which could contradict.
     turned : bool
         Whether a magnetic energy that depends on the slope counts as well.
+    pulled : bool
+        Whether it is a field that takes the stiffness of the sheet along the meridian, see :mod:`.pull_in`.
     """
 
     low: float
@@ -56,9 +59,12 @@ class IllPosed:
     slack: bool
     confirmed: bool = True
     turned: bool = False
+    pulled: bool = False
 
     @property
     def status(self) -> Status:
+        if self.pulled:
+            return Status.PULLED_IN
         return Status.SLACK if self.slack else Status.LEGENDRE_FAILURE
 
     @property
@@ -67,6 +73,8 @@ class IllPosed:
 
     def __str__(self) -> str:
         doubt = "" if self.confirmed else f" ({UNCONFIRMED})"
+        if self.pulled:
+            return f"the field leaves no stiffness along the meridian at {self.where}: the sheet is pulled in there"
         if self.slack:
             return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there{doubt}"
         if self.turned:
@@ -79,8 +87,8 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     shows.
     """
     found = apparent(potential, evaluation)
-    if found is None:
-        return None
+    if found is None or found.pulled:
+        return found
     if found.slack:
         sure = confirmed(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation)
         return None if sure is False else replace(found, confirmed=bool(sure))
@@ -89,22 +97,23 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
 
 def _nearly_slack(evaluation: Evaluation) -> bool:
     """Whether some point has little meridional tension left. A mesh folds before the membrane does, and a coarse mesh first."""
-    return apparent(evaluation.potential, evaluation) is not None or bool(
-        evaluation.stress[0].min() < _LITTLE * np.abs(evaluation.stress).max()
-    )
+    return apparent(evaluation.potential, evaluation) is not None or bool(evaluation.stress[0].min() < _LITTLE * stress_scale(evaluation))
 
 
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation, an equilibrium or not, is ill-posed on its own mesh."""
     slack = potential.scene.tension_field
+    pulled = pulled_in(potential, evaluation)
+    if pulled.size:
+        return IllPosed(float(pulled.min()), float(pulled.max()), False, pulled=True)
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
-    scale = np.abs(evaluation.stress).max(initial=0.0)
+    scale = stress_scale(evaluation)
     if not scale and not potential.strained:  # the unloaded membrane is not slack but at rest, where its ends do not bring it closer
         return None
     r = potential.space.R.ravel()[unsupported(supporting(evaluation)[0], scale, slack) | (not scale)]
     if slack:
-        r = np.append(r, _folds(potential, evaluation.x, scale))
+        r = np.append(r, _folds(potential, evaluation, scale))
     return IllPosed(float(r.min()), float(r.max()), slack, turned=potential.tilts) if r.size else None
 
 
@@ -130,6 +139,17 @@ def supporting(evaluation: Evaluation) -> Array:
     return np.stack([left.ravel(), evaluation.stress[1]])
 
 
+def stress_scale(evaluation: Evaluation) -> float:
+    """The largest stress of a state; with voltage or charge also that of Maxwell, with which the stress of the material may balance."""
+    return evaluation.once("stress scale", _stress_scale)
+
+
+def _stress_scale(evaluation: Evaluation) -> float:
+    largest = float(np.abs(evaluation.stress).max(initial=0.0))
+    potential = evaluation.potential
+    return largest if potential.electric is None else max(largest, potential.largest_field(evaluation.x, evaluation.factor) ** 2)
+
+
 def _least_meridional(evaluation: Evaluation) -> float:
     return float(supporting(evaluation)[0].min(initial=0.0))
 
@@ -151,7 +171,7 @@ def compressed(potential: Potential, evaluation: Evaluation, component: int, str
         sure = confirmed(lambda found: least_stress(found.evaluation, component, stresses) < 0, potential, evaluation)
     if sure is False:
         return None
-    r = potential.space.R.ravel()[unsupported(stress, np.abs(evaluation.stress).max(), False)]
+    r = potential.space.R.ravel()[unsupported(stress, stress_scale(evaluation), False)]
     return IllPosed(float(r.min()), float(r.max()), False, bool(sure), potential.tilts)
 
 
@@ -160,7 +180,7 @@ def least_stress(evaluation: Evaluation, component: int, stresses: Supporting = 
     least = float(stresses(evaluation)[component].min(initial=0.0))
     if least >= 0:  # the usual case needs no scale
         return 0.0
-    return least if unsupported(np.array(least), np.abs(evaluation.stress).max(), False) else 0.0
+    return least if unsupported(np.array(least), stress_scale(evaluation), False) else 0.0
 
 
 def _plain(stress: Array) -> bool:
@@ -171,13 +191,13 @@ def _plain(stress: Array) -> bool:
     return bool((high < low - high).any())
 
 
-def _folds(potential: Potential, x: Array, scale: float) -> Array:
+def _folds(potential: Potential, evaluation: Evaluation, scale: float) -> Array:
     """Reference radii where two elements meet at so sharp an angle that a smooth meridian between them would be slack."""
     space = potential.space
     s = space.ends[1:-1]
     (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
-    u, u_s, _, w_s = space.at_inner_ends(x)
-    stress, _ = potential.material.stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
+    u, u_s, _, w_s = space.at_inner_ends(evaluation.x)
+    stress, _ = potential.response_at(evaluation.x, R, Z, s, evaluation.factor).stress(*hencky_strains(R, R_s, Z_s, u, u_s, w_s))
     if potential.sheet is not None:
         stress = stress * potential.sheet.factors(R, Z, s)[1]
     return R[unsupported(stress, scale, True)]
@@ -212,8 +232,8 @@ def is_slack(potential: Potential, state: State) -> bool:
 def slackness(potential: Potential, state: State, accepted: list[State] | None = None) -> SolveError:
     """The error that ends a path at an ill-posed state, slack or compressed, with the states accepted before and it."""
     where = f"V = {state.volume:.6g}, P = {state.pressure:.6g}"
-    status = Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
     found = ill_posed(potential, state.evaluation) or apparent(potential, state.evaluation)
+    status = found.status if found else Status.SLACK if potential.scene.tension_field else Status.LEGENDRE_FAILURE
     return SolveError(f"at {where} {found}", status=status, result=accepted)
 
 

@@ -16,7 +16,8 @@ from ..discretization.space import Space
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Verdict
-from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, least_stress
+from ..solve.pull_in import shears_in
+from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
 from .acoustic import supporting_all
 from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
@@ -148,4 +149,7 @@ def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves
             doubt = "" if zone.confirmed else f" ({UNCONFIRMED})"
             what = f"{name} stress not held against the field" if zone.turned else f"{name} stress compressive"
             found.append(ShortWaves(f"{what} at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
+    pulled = shears_in(potential, evaluation)
+    if pulled.size and not found:
+        found.append(ShortWaves(f"the field leaves no stiffness in the plane at {interval(pulled.min(), pulled.max())}", True))
     return found

@@ -47,6 +47,8 @@ class AzimuthalOperator:
         Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
     spin : ndarray, shape (n_free,), or None
         The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
+    spring : ndarray, shape (n_free,), or None
+        Of a total charge at n = 0, see :class:`.Evaluation`; waves do not change the capacitance to first order.
     """
 
     band: Array
@@ -59,10 +61,12 @@ class AzimuthalOperator:
     density: Array
     rigid: Array | None = None
     spin: Array | None = None
+    spring: Array | None = None
 
     def pencil(self, constraint: Array | None = None) -> Pencil:
         """K - lambda M, motions that cost nothing taken out."""
-        return pencil_of(self.band, self.mass, self.half_bandwidth, self.spin if constraint is None else constraint, 0.0, self.rigid)
+        held = self.spin if constraint is None else constraint
+        return pencil_of(self.band, self.mass, self.half_bandwidth, held, 0.0, self.rigid, self.spring)
 
     def shape(self, mode: Array) -> dict[str, Array]:
         """A mode at the nodes, see :func:`azimuthal_shape`."""
@@ -98,15 +102,17 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
         work = np.pi * n * pressure * float(rho[0]) * (space.side if end == 0 else -space.side)  # of the film across a free edge
         for row, column in ((i, j), (j, i)) if j < layout.n_free else ():  # b may be held there against a tilt of the whole
             band[2 * layout.half_bandwidth + row - column, column] += work
+    spring = potential.evaluate(np.asarray(x, dtype=float), pressure).spring if n == 0 and potential.charged is not None else None
     rigid, spin, mass = None, None, layout.mass(potential.bulk)
     motions = _rigid_motions(space, response, int(n))
     if len(motions):
         area = potential.bulk
         rigid = rigid_part(np.stack([layout.integrate(motion * area) for motion in motions], axis=1), _products(motions, motions, area))
     turns = potential.magnetisation is None or potential.magnetisation.turns
-    if n == 1 and space.spins and potential.sheet is None and turns:
+    uniform = potential.sheet is None and potential.electrode is None
+    if n == 1 and space.spins and uniform and turns:
         spin = _spin(space, layout, response, motions, pencil_of(band, mass, layout.half_bandwidth, None, 0.0, rigid))
-    return AzimuthalOperator(band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin)
+    return AzimuthalOperator(band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin, spring)
 
 
 def _products(first: Array, second: Array, area: Array) -> Array:

@@ -118,7 +118,7 @@ def _with_discretisation_error(
         return _open(verdict, max(error, SAFETY * abs(best.smallest_eigenvalue - value)))
     numbers = f"{best.smallest_eigenvalue:.6g} on finer elements; {value:.3g} on this mesh, which does not resolve it"
     stable = best.smallest_eigenvalue > 0
-    reason = in_words(stable, best.negative_directions, against(verdict.control, verdict.azimuthal), numbers)
+    reason = in_words(stable, best.negative_directions, against(verdict.control, verdict.azimuthal, potential.electric), numbers)
     return replace(best, stable=stable, error=left, reason=reason, _shape=verdict._shape, _unresolved=verdict._unresolved)
 
 

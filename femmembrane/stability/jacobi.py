@@ -106,7 +106,8 @@ def legendre_test(equilibrium: Equilibrium) -> LegendreTest:
     potential = equilibrium.potential
     space = potential.space
     displacement = space.displacement_at_quadrature(equilibrium.state)
-    response = local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
+    square = potential.local_square(equilibrium.state, space.R, space.Z, space.s)
+    response = local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s, square)
     along, mixed, across = _slope_moduli(response)
     smallest = (along + across - np.hypot(along - across, 2 * mixed)) / 4 if response.sloped is not None else np.minimum(along, across) / 2
     at = int(np.argmin(smallest))
@@ -187,7 +188,8 @@ class _Coefficients:
         s = self.ends[:-1, None] + size[:, None] * (1 + np.cos(angle)) / 2
         mesh, displacement = potential.space.mesh, potential.space.displacement(x, s.ravel())
         (R, Z), (R_s, Z_s) = mesh.position(s.ravel()), mesh.tangent(s.ravel())
-        samples = self._regular(local_response(potential, (R, R_s, Z, Z_s), displacement, s.ravel())).reshape(-1, *s.shape)
+        square = potential.local_square(x, R, Z, s.ravel())
+        samples = self._regular(local_response(potential, (R, R_s, Z, Z_s), displacement, s.ravel(), square)).reshape(-1, *s.shape)
         transform = 2 / _SAMPLES * np.cos(np.arange(_SAMPLES)[:, None] * angle)
         transform[0] /= 2
         self._series = np.einsum("kp,cep->ekc", transform, samples)

@@ -9,14 +9,18 @@ from numpy.typing import NDArray
 
 from ..discretization.meridian import LEAST_LENGTH
 from ..discretization.space import space_of_scene
+from ..physics.electric_wrinkles import ElectricTensionField
+from ..physics.electrified import Electrified
 from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
 from ..physics.magnetisation import Magnetisation, remanence_column
+from ..physics.response import response_of
 from ..physics.scales import Scales
 from ..physics.sheet import Sheet
 from ..physics.stress import magnetised_stress, total_stress
-from ..physics.tension_field import cauchy_stress, strain_energy
+from ..physics.tension_field import TensionField, cauchy_stress
+from ..potential import potential_of
 from ..quantities import quantity, si_values
 from ..scene import Scene
 
@@ -39,6 +43,12 @@ class Profile:
         Hencky strains (e_1, e_2).
     mechanical, total : (ndarray, ndarray)
         Principal Cauchy stresses in units of mu (:mod:`~femmembrane.physics.stress`).
+    effective : (ndarray, ndarray)
+        What the energy feels: the mechanical stresses, less that of Maxwell under a voltage or a charge.
+    beyond : (ndarray, ndarray) or None
+        In a tension field the strains beyond natural width.
+    field : ndarray or None
+        With voltage or charge the true electric field in units of sqrt(mu/eps).
     """
 
     r: Array
@@ -48,6 +58,9 @@ class Profile:
     strain: tuple[Array, Array]
     mechanical: tuple[Array, Array]
     total: tuple[Array, Array]
+    effective: tuple[Array, Array]
+    beyond: tuple[Array, Array] | None = None
+    field: Array | None = None
 
     def columns(self, scales: Scales | None = None) -> dict[str, Array]:
         """The profile by the names of its columns, with stretches in place of strains, and the stresses in Pa too if there are scales."""
@@ -62,6 +75,7 @@ class Profile:
             "mechanical_stress_2": self.mechanical[1],
             "total_stress_1": self.total[0],
             "total_stress_2": self.total[1],
+            **({} if self.field is None else {"electric_field": self.field}),
         }
         if scales is not None:
             columns |= si_values({name: values for name, values in columns.items() if quantity(name).si == "stress"}, scales)
@@ -92,10 +106,16 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
     e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
     rho, eta = R + u, Z + w
-    mechanical = cauchy_stress(strain_energy(scene.material, scene.tension_field), e1, e2)
+    response = response_of(scene, None if scene.electricity is None else potential_of(scene).local_square(x, R, Z, s))
+    effective = mechanical = cauchy_stress(response, e1, e2)
+    field = None
+    if isinstance(response, (Electrified, ElectricTensionField)):
+        mechanical, field = response.mechanical_stress(e1, e2), np.sqrt(response.field_squared(e1, e2))
     if (sheet := Sheet.of(scene)) is not None:
         modulus = sheet.factors(R, Z, s)[1]
-        mechanical = (modulus * mechanical[0], modulus * mechanical[1])
+        effective, mechanical = ((modulus * pair[0], modulus * pair[1]) for pair in (effective, mechanical))
+        field = None if field is None else field * np.sqrt(modulus)
+    beyond = response.beyond(e1, e2) if isinstance(response, (TensionField, ElectricTensionField)) else None
     h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)
     slope = np.hypot(R_s + u_s, Z_s + w_s)
     tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
@@ -103,8 +123,8 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     surroundings = local, scene.radius_to_thickness, h, tangent
     magnetisation = Magnetisation.of(scene)
     if magnetisation is None:
-        total = total_stress(mechanical, *surroundings, scene.susceptibility or 0.0)
+        total = total_stress(effective, *surroundings, scene.susceptibility or 0.0)
     else:
         stretches, remanence = (np.exp(e1), np.exp(e2)), remanence_column(magnetisation, R, Z, s, space.side)
-        total = magnetised_stress(mechanical, *surroundings, stretches, magnetisation, remanence)
-    return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total)
+        total = magnetised_stress(effective, *surroundings, stretches, magnetisation, remanence)
+    return Profile(R, None if space.radial else s, rho, eta, (e1, e2), mechanical, total, effective, beyond, field)

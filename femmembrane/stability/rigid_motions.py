@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kernels.bordered import SpringFactor
 from ..potential import Array
-from ..solve.banded import BandFactor, BorderedFactor, band_product, negative_directions
+from ..solve.banded import BandFactor, BorderedFactor, band_product, bordered_count, negative_directions
 from .spectrum import Pencil
 
 
@@ -74,8 +75,53 @@ def rigid_part(product: Array, gram: Array) -> Array:
     return np.linalg.solve(np.linalg.cholesky(gram), product.T).T
 
 
-def pencil_of(band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float, rigid: Array | None) -> Pencil:
-    """The pencil of a membrane that is held, or with ``rigid`` motions taken out."""
+class SpringPencil(FloatingPencil):
+    """K + a a^T - lambda (M - U U^T), with a constraint if given: a total charge couples all points by a spring a.
+
+    Parameters
+    ----------
+    band, mass, kd, constraint, compliance, rigid
+        As for :class:`FloatingPencil`; without rigid motions of shape (n, 0).
+    spring : ndarray, shape (n,)
+    """
+
+    def __init__(self, band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float, rigid: Array, spring: Array) -> None:
+        super().__init__(band, mass, kd, constraint, compliance, rigid)
+        self.spring = spring
+
+    def stiffness(self, mode: Array) -> Array:
+        return super().stiffness(mode) + self.spring * (self.spring @ mode)
+
+    def shifted_solver(self, shift: float) -> BandFactor | BorderedFactor:
+        factor = BandFactor(self.band - shift * self.mass)
+        if shift and self.rigid.shape[1]:
+            factor = _RankFactor(factor, self.rigid, shift)
+        sprung = _Sprung(factor, self.spring)
+        return sprung if self.constraint is None else BorderedFactor(sprung, self.constraint, self.constraint, -self.compliance)
+
+    def count(self, shift: float) -> int:
+        borders, corners = [self.spring], [-1.0]
+        if shift:
+            borders, corners = [*borders, *self.rigid.T], [*corners, *[-1 / shift] * self.rigid.shape[1]]
+        if self.constraint is not None:
+            borders, corners = [*borders, self.constraint], [*corners, -self.compliance]
+        band = self.band - shift * self.mass if shift else self.band
+        return bordered_count(band, self.kd, np.stack(borders, axis=1), np.array(corners))
+
+
+class _Sprung(BandFactor):
+    """Solver for A + a a^T from factors of A."""
+
+    def __init__(self, factor: BandFactor, spring: Array) -> None:
+        self._factor = SpringFactor(factor, spring)
+
+
+def pencil_of(
+    band: Array, mass: Array, kd: int, constraint: Array | None, compliance: float, rigid: Array | None, spring: Array | None = None
+) -> Pencil:
+    """The pencil of a membrane that is held, or with ``rigid`` motions taken out; with the ``spring`` of a total charge if given."""
+    if spring is not None:
+        return SpringPencil(band, mass, kd, constraint, compliance, np.zeros((len(spring), 0)) if rigid is None else rigid, spring)
     if rigid is None:
         return Pencil(band, mass, kd, constraint, compliance)
     return FloatingPencil(band, mass, kd, constraint, compliance, rigid)

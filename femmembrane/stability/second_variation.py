@@ -40,7 +40,7 @@ import numpy as np
 from ..discretization.space import Space
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import Load, over_projection
-from ..physics.tension_field import TensionField
+from ..physics.response import response_of
 from ..potential import Array, Potential
 
 #: difference of the logarithmic stretches below which (s_1 - s_2)/(e_1 - e_2) is integrated rather than divided out; both ways are
@@ -82,7 +82,7 @@ class LocalResponse:
     ----------
     rho, eta, rho_x, eta_x : deformed position and slopes
     t_rho, t_z : unit tangent
-    s1, s2 : principal mechanical stresses l_i W_i
+    s1, s2 : principal stresses that the energy feels: mechanical ones l_i W_i, less that of Maxwell under a voltage
     W11, W12, W22 : second derivatives of the strain energy with respect to the stretches
     N1, N2 : W_1/l1 and W_2/l2, the stiffness of rotation out of the surface
     A, B : in-plane shear moduli, continuous through l1 = l2
@@ -112,29 +112,34 @@ class LocalResponse:
 
 
 def local_response(
-    potential: Potential, meridian: tuple[Array, ...], displacement: tuple[Array, ...], s: Array | None = None
+    potential: Potential,
+    meridian: tuple[Array, ...],
+    displacement: tuple[Array, ...],
+    s: Array | None = None,
+    square: Array | None = None,
 ) -> LocalResponse:
     """Response at points (R, R_x, Z, Z_x) of the reference meridian displaced by (u, u_x, w, w_x); R > 0 and any shape.
 
     Of an uneven sheet, which asks for the places ``s`` of the points (default their radii), stresses and moduli are forces per length:
-    times thickness and modulus.
+    times thickness and modulus. ``square`` is the local square of voltage or charge, with one of them.
     """
     R, R_x, Z, Z_x = meridian
     u, u_x, w, w_x = displacement
     shape = R.shape
     rho, eta, rho_x, eta_x = R + u, Z + w, R_x + u_x, Z_x + w_x
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
-    s1, s2, d11, d12, d22 = potential.response(e1, e2).reshape(5, *shape)
+    places = R if s is None else s
+    s1, s2, d11, d12, d22 = potential.response(e1, e2, square).reshape(5, *shape)
     l1, l2 = np.exp(e1), np.exp(e2)
     slope = np.hypot(rho_x, eta_x)
     # l1^2 - l2^2 = 2 l1 l2 sinh d for d = e1 - e2
     d = e1 - e2
-    A = _stress_quotient(potential, e1, e2, s1 - s2, d) * _over_sinh(d) / (2 * l1 * l2)
+    A = _stress_quotient(potential, e1, e2, s1 - s2, d, square) * _over_sinh(d) / (2 * l1 * l2)
     B = ((l1**2 + l2**2) / 2 * A - (s1 + s2) / 2) / (l1 * l2)
     field = potential.field_energy(rho, eta).reshape(6, *shape)
     sloped = _sloped(potential, (R, R_x, Z, Z_x), (rho, eta, rho_x, eta_x), s)
     if potential.sheet is not None:
-        thickness, modulus = potential.sheet.factors(R, Z, R if s is None else s)
+        thickness, modulus = potential.sheet.factors(R, Z, places)
         force = thickness * modulus
         s1, s2, d11, d12, d22, A, B = (part * force for part in (s1, s2, d11, d12, d22, A, B))
         field = field * thickness
@@ -179,7 +184,7 @@ def _over_sinh(d: Array) -> Array:
     return np.where(d == 0, 1.0, safe / np.sinh(safe))
 
 
-def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Array, d: Array) -> Array:
+def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Array, d: Array, square: Array | None) -> Array:
     """(s_1 - s_2)/(e_1 - e_2), continuous through equal stretches.
 
     For an isotropic material the difference g is odd in d at fixed mean strain, so g/d = Int_0^1 g'(t d) dt has an even integrand, and
@@ -187,12 +192,12 @@ def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Arr
     """
     close = np.abs(d) < EQUAL_STRETCH
     if potential.scene.tension_field:  # where one stress is gone, the difference is odd but not smooth, and has no digits to lose
-        _, _, taut1, taut2 = TensionField(potential.scene.material).natural(e1, e2)
+        _, _, taut1, taut2 = response_of(potential.scene, square).natural(e1, e2)  # type: ignore[attr-defined]
         close &= taut1 == taut2
     quotient: Array = difference / np.where(close, 1.0, d)
     if close.any():
         mean, half = (e1 + e2)[close] / 2, d[close] / np.sqrt(12)
-        _, _, d11, d12, d22 = potential.response(mean + half, mean - half)
+        _, _, d11, d12, d22 = potential.response(mean + half, mean - half, None if square is None else square[close])
         quotient[close] = (d11 - 2 * d12 + d22) / 2
     return quotient
 
@@ -201,8 +206,10 @@ def _stress_quotient(potential: Potential, e1: Array, e2: Array, difference: Arr
 def response_at_quadrature(potential: Potential, state: bytes) -> LocalResponse:
     """Remembered for the other n of the same state."""
     space = potential.space
-    displacement = space.displacement_at_quadrature(np.frombuffer(state))
-    return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s)
+    x = np.frombuffer(state)
+    displacement = space.displacement_at_quadrature(x)
+    square = potential.local_square(x, space.R, space.Z, space.s)
+    return local_response(potential, (space.R, space.R_x, space.Z, space.Z_x), tuple(displacement), space.s, square)
 
 
 def second_variation(space: Space, r: LocalResponse, loads: Sequence[Load], pressure: float, n: int) -> list[Array]:

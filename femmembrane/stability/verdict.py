@@ -9,6 +9,7 @@ import numpy as np
 from ..checks import choice
 from ..discretization.space import Space
 from ..errors import InputError
+from ..physics.electric import Electric
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Shape, Verdict
 from ..solve.wellposed import apparent, ill_posed
@@ -45,12 +46,13 @@ def axisymmetric_verdict(
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
     found = smallest_of(
-        pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid), guess
+        pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid, evaluation.spring),
+        guess,
     )
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
-    return verdict_from(found, against(control, 0), control, 0, shape, unresolved)
+    return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
 
 
 def short_wave_verdict(where: str, confirmed: bool, control: str | None, n: int) -> Verdict:
@@ -60,11 +62,12 @@ def short_wave_verdict(where: str, confirmed: bool, control: str | None, n: int)
     return Verdict(False if confirmed else None, np.nan, np.nan, control, n, None, f"{kind}: {where}")
 
 
-def against(control: str | None, n: int) -> str:
-    """A class of perturbations in words."""
+def against(control: str | None, n: int, electric: Electric | None = None) -> str:
+    """A class of perturbations in words; with what is held of voltage and charge, which waves around the axis do not tell apart."""
     if n:
         return f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
     held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control or "volume"]
+    held += {"voltage": ", the voltage held,", "total_charge": ", the total charge held,"}.get(electric.load, "") if electric else ""
     return f"axisymmetric perturbations {held}"
 
 

@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from ..checks import choice
 from ..discretization.space import Space, space_of_scene
-from ..physics.tension_field import TensionField
 from ..potential import potential_of
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
@@ -35,7 +34,7 @@ from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
 from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
-from .profile import Profile, profile_at
+from .profile import profile_at
 
 Array = NDArray[np.float64]
 
@@ -125,7 +124,7 @@ def _changing(
 def _deciding(scene: Scene, x: Array, pressure: float, criterion: str) -> _Stresses:
     def deciding(s: Array) -> tuple[Array, Array]:
         profile = profile_at(scene, x, pressure, s)
-        return profile.total if criterion == "total" else _mechanical(profile, scene)
+        return profile.total if criterion == "total" else profile.beyond or profile.effective
 
     return deciding
 
@@ -167,12 +166,6 @@ def _runs(flags: Sequence[bool]) -> list[tuple[int, int]]:
     starts = [k for k, flag in enumerate(flags) if flag and (k == 0 or not flags[k - 1])]
     stops = [k for k, flag in enumerate(flags) if flag and (k + 1 == len(flags) or not flags[k + 1])]
     return list(zip(starts, stops, strict=True))
-
-
-def _mechanical(profile: Profile, scene: Scene) -> tuple[Array, Array]:
-    if not scene.tension_field:
-        return profile.mechanical
-    return TensionField(scene.material).beyond(*profile.strain)
 
 
 def _tiles(space: Space, deciding: _Stresses) -> tuple[list[int], Array]:

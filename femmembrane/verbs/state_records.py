@@ -104,6 +104,7 @@ def record(
         scene=scene,
         state=coefficients,
         load_energy=state.evaluation.load_energy,
+        electric_energy=state.evaluation.electric_energy,
         gas=gas,
     )
     for analysis in asked(scene):

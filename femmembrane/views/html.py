@@ -61,7 +61,8 @@ def branch_rows(branch: Branch, most: int = MOST_ROWS) -> tuple[list[str], list[
 def equilibrium_pairs(equilibrium: Equilibrium) -> list[tuple[str, Any]]:
     """The numbers of an equilibrium, with the verdicts that its scene asks for."""
     scene = equilibrium.scene
-    energies = ["elastic_energy", *(["magnetic_energy"] if scene.sources else []), *(["load_energy"] if scene.loads else [])]
+    parts = {"magnetic_energy": scene.sources, "load_energy": scene.loads, "electric_energy": scene.electric}
+    energies = ["elastic_energy", *(name for name, part in parts.items() if part)]
     return [
         *((title(name), getattr(equilibrium, name)) for name in (*PLACES, *energies, "residual", "status")),
         *((remark.subject, remark.text) for remark in remarks(equilibrium)),

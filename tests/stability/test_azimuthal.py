@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 
 import femmembrane as fm
 from femmembrane.errors import InputError
+from femmembrane.physics.response import response_of
 from femmembrane.potential import Potential, potential_of
 from femmembrane.solve.banded import band_product, negative_directions
 from femmembrane.stability.azimuthal import azimuthal_eigenvalue, azimuthal_verdict, lowest_eigenvalues
@@ -196,7 +197,7 @@ def _surface_energies(potential: Potential, x: np.ndarray, mode: np.ndarray, n: 
     c12 = sum(f * g for f, g in zip(along, around, strict=True)) / (J * R)
     mean, radius = (c11 + c22) / 2, np.hypot((c11 - c22) / 2, c12)
     weights = space.weights[..., None] / len(angle)
-    elastic = potential.material.energy(np.log(mean + radius) / 2, np.log(mean - radius) / 2)
+    elastic = response_of(potential.scene).energy(np.log(mean + radius) / 2, np.log(mean - radius) / 2)
     magnetic = potential.field_energy(np.hypot(rho, theta), z + 0 * theta)[0].reshape(elastic.shape)
     if space.lids and (n == 0 or space.spreads):
         across = rho * (along[1] * around[2] - along[2] * around[1]) + theta * (along[2] * around[0] - along[0] * around[2])

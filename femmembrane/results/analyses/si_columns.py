@@ -38,12 +38,12 @@ class SIColumns(EquilibriumAnalysis):
 
 
 def _names(scene: Scene) -> list[str]:
-    magnetic, loaded = ["magnetic_energy"] if scene.sources else [], ["load_energy"] if scene.loads else []
-    return [*PLACES, "elastic_energy", *magnetic, *loaded]
+    parts = {"magnetic_energy": scene.sources, "load_energy": scene.loads, "electric_energy": scene.electric}
+    return [*PLACES, "elastic_energy", *(name for name, part in parts.items() if part)]
 
 
 def _converted(place: Equilibrium | SpecialPoint, column: str, scene: Scene) -> float:
-    name = next(name for name in (*PLACES, "elastic_energy", "magnetic_energy", "load_energy") if in_si(name) == column)
+    name = next(name for name in (*PLACES, "elastic_energy", "magnetic_energy", "load_energy", "electric_energy") if in_si(name) == column)
     scales = scene.scales
     return float("nan") if scales is None else float(scales.to_si(quantity(name).si, float(getattr(place, name))))
 

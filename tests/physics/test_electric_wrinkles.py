@@ -1,0 +1,98 @@
+"""The tension field under voltage and charge: closed forms, differences of its own energy, and states that it holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import femmembrane as fm
+from femmembrane.physics.response import response_of
+from femmembrane.physics.tension_field import natural_strains
+from tests.cases import OGDEN
+
+DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), degree=4, tension_field=True)
+STRAINS = np.random.default_rng(3).uniform(-0.5, 0.7, (2, 300))
+
+
+def relaxed(square, material=None, charge=False):
+    electric = fm.Electric(frozen_charge=1.0) if charge else fm.Electric(voltage=1.0)
+    return response_of(DISC.replace(material=material or fm.NeoHookean(), electric=electric), square)
+
+
+def test_natural_width():
+    """neo-Hookean: m = -e/2 - log(1 - psi^2 l^2)/4, up to its end at psi l = 1, and -e/2 + log(1 + q^2)/4 under a frozen charge."""
+    e = np.linspace(-0.3, 1.0, 14)
+    width, exists = relaxed(0.09).width(e)
+    assert exists.all()
+    assert width == pytest.approx(-e / 2 - np.log1p(-0.09 * np.exp(2 * e)) / 4, rel=1e-12, abs=1e-14)
+    assert not relaxed(0.09).width(np.array([np.log(1 / 0.3) + 0.01]))[1].any()
+    width, exists = relaxed(0.5, charge=True).width(e)
+    assert exists.all()
+    assert width == pytest.approx(-e / 2 + np.log1p(0.5) / 4, abs=1e-13)
+
+
+def test_slack_strain():
+    """s = v at equal strains: exists up to the pull-in phi^2 = 3/4 4^(-1/3) = 0.4724703937; under a frozen charge always, l^6 = 1 + q^2."""
+    for square, found in ((0.3, True), (0.47, True), (0.475, False), (2.0, False)):
+        e, exists = relaxed(square).slack_strain()
+        assert bool(exists) is found
+        if found:
+            stretch = np.exp(e)
+            assert stretch**2 - stretch**-4 == pytest.approx(square * stretch**4, rel=1e-12)
+        slack = np.stack(relaxed(square).stress(np.array([-0.2]), np.array([-0.3])))
+        assert np.isnan(slack).all() if not found else (slack == 0).all()
+    e, exists = relaxed(2.0, charge=True).slack_strain()
+    assert exists
+    assert np.exp(6 * e) == pytest.approx(3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("charge", [False, True], ids=["voltage", "charge"])
+@pytest.mark.parametrize("material", [fm.NeoHookean(), OGDEN, fm.MooneyRivlin(0.2), fm.Gent(30.0)], ids=lambda m: type(m).__name__)
+def test_differences(material, charge):
+    """Stress is the derivative of the energy everywhere, and the tangent that of stress but on the borders of zones."""
+    response, (e1, e2), h = relaxed(0.1, material, charge), STRAINS, 1e-6
+
+    def whole(a, b):
+        return response.energy(a, b) + response.electric_energy(a, b)
+
+    slopes = [(whole(e1 + h, e2) - whole(e1 - h, e2)) / (2 * h), (whole(e1, e2 + h) - whole(e1, e2 - h)) / (2 * h)]
+    assert np.stack(response.stress(e1, e2)) == pytest.approx(np.stack(slopes), abs=1e-8)
+    left, right = response.stress(e1 - h, e2), response.stress(e1 + h, e2)
+    below, above = response.stress(e1, e2 - h), response.stress(e1, e2 + h)
+    slopes = [(right[0] - left[0]) / (2 * h), (above[0] - below[0]) / (2 * h), (above[1] - below[1]) / (2 * h)]
+    off = np.abs(np.stack(response.tangent(e1, e2)) - np.stack(slopes))
+    assert (off < 1e-7).mean() > 0.99
+
+
+def test_without_field_it_is_the_plain_one():
+    e1, e2 = STRAINS
+    assert np.stack(relaxed(0.0).natural(e1, e2)) == pytest.approx(np.stack(natural_strains(e1, e2)), abs=1e-15)
+
+
+def test_wrinkles_are_a_local_minimum():
+    """No strain between the given ones and natural ones has less energy; the stress across wrinkles is that of the field."""
+    response, (e1, e2) = relaxed(0.15), STRAINS
+    n1, n2, taut1, taut2 = response.natural(e1, e2)
+    taken = response.energy(e1, e2) + response.electric_energy(e1, e2)
+    for share in np.linspace(0, 1, 7):
+        a, b = e1 + share * (n1 - e1), e2 + share * (n2 - e2)
+        assert (response.taut.energy(a, b) + response.taut.electric_energy(a, b) >= taken - 1e-14).all()
+    wrinkled = (taut1 == 1) & (taut2 == 0)
+    assert wrinkled.any()
+    mechanical = response.mechanical_stress(e1, e2)[1][wrinkled]
+    assert mechanical == pytest.approx(response.field_squared(e1, e2)[wrinkled], rel=1e-10)
+
+
+def test_branch():
+    """Along a relaxed branch dE/dV = P, and at one volume dE/dphi = -Q with the capacitance of the wrinkled width."""
+    scene = DISC.replace(electric=fm.Electric(voltage=0.3))
+    at, h = 0.3, 1e-4
+    eq = fm.equilibrium(scene, volume=at)
+    assert "radial" in {zone.kind for zone in eq.zones("mechanical")}
+    a, b = (fm.equilibrium(scene, volume=at + k * h) for k in (-1, 1))
+    assert (b.energy - a.energy) / (2 * h) == pytest.approx(eq.pressure, rel=1e-5)
+    a, b = (fm.equilibrium(scene.replace(electric=fm.Electric(voltage=0.3 + k * h)), volume=at) for k in (-1, 1))
+    assert (b.energy - a.energy) / (2 * h) == pytest.approx(-eq.charge, rel=1e-6)
+    held = fm.equilibrium(scene.replace(electric=fm.Electric(total_charge=eq.charge)), volume=at)
+    assert (held.pressure, held.voltage) == pytest.approx((eq.pressure, 0.3), rel=1e-7)
+    assert all(eq.verdict(azimuthal=n).stable for n in (1, 2))

@@ -63,10 +63,13 @@ def _way(scene: Scene, equilibrium: Equilibrium) -> str:
     from ..quantities import words
 
     until = scene.run.until if scene.run is not None and scene.run.until else {}
-    return ", ".join(
-        f"{words(name)} {equilibrium.number(name) if '.' in name else getattr(equilibrium, name):.4g} until {end:.4g}"
-        for name, end in until.items()
-    )
+    return ", ".join(f"{words(name)} {_value(equilibrium, name):.4g} until {end:.4g}" for name, end in until.items())
+
+
+def _value(equilibrium: Equilibrium, name: str) -> float:
+    if "." in name:
+        return equilibrium.number(name)
+    return equilibrium.gas_amount if name == "gas" else float(getattr(equilibrium, name))
 
 
 def _line(equilibrium: Equilibrium) -> str:

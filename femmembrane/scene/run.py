@@ -117,7 +117,7 @@ class Run:
             stop=None if self.stop is None else number("run.stop", self.stop),
             steps=None if self.steps is None else whole("run.steps", self.steps, most=MAX_STEPS),
             values=None if self.values is None else _loads("run.values", self.values),
-            until=None if self.until is None else _target("run.until", self.until, (*PLACES, *([self.over] if self.over else []))),
+            until=None if self.until is None else _target("run.until", self.until, (*HELD, *([self.over] if self.over else []))),
             hold=None if self.hold is None else _target("run.hold", _public(self.hold), HELD),
             max_steps=whole("run.max_steps", self.max_steps, most=MAX_STEPS),
         )

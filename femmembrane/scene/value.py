@@ -193,7 +193,7 @@ class Scene:
         run = self.run
         if run is not None and isinstance(number := getattr(run, "number", None), str) and number not in (known := names(self)):
             raise unknown_name("run.over" if run.over else "run.control", number, known or ["(this scene has no number to vary)"])
-        gas = run is not None and (run.control == GAS or GAS in (run.hold or ()))
+        gas = run is not None and (run.control == GAS or GAS in (run.hold or ()) or GAS in (run.until or ()))
         if self.chamber is None and (gas or GAS in self.analysis.stability):
             raise InputError("chamber", None, "missing; an amount of gas needs the volume of its chamber: give chamber.volume")
 

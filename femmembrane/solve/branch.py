@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from .banded import BorderedFactor, band_inner, band_product
-from .continuation import BranchPoint, CurveProblem
+from .continuation import BranchPoint, CurveProblem, Followed
 from .controls import CONTROLS, ArcLengthControl
 from .newton import TOLERANCE, NewtonResult, correct
 from .state import State, flat_state, joined, rests_flat
@@ -76,9 +76,15 @@ class BranchProblem(CurveProblem[BranchPoint]):
                 return tangent_at(self.potential, State.of(result), near)
         raise SolveError("the branch between two neighbouring points could not be resolved", status=result.status)
 
-    def hold(self, quantity: str, value: float, near: BranchPoint) -> BranchPoint | None:
+    def hold(self, quantity: Followed, value: float, near: BranchPoint) -> BranchPoint | None:
         pressure = value if quantity == "pressure" else near.state.pressure
-        result = correct(self.potential, CONTROLS[quantity].at(value), near.state.x, pressure, tolerance=_EXACT)
+        result = correct(
+            self.potential,
+            (CONTROLS[quantity] if isinstance(quantity, str) else quantity).at(value),
+            near.state.x,
+            pressure,
+            tolerance=_EXACT,
+        )
         return tangent_at(self.potential, State.of(result), near) if result.status is Status.CONVERGED else None
 
     def determinant_sign(self, point: BranchPoint) -> int:

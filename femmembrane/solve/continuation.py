@@ -13,7 +13,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
@@ -50,6 +50,10 @@ class StepControl:
     turn: float = 0.35
 
 
+#: what is looked at along a curve: one of its quantities by name, or a controlled number that is none of them, such as the amount of a gas
+Followed: TypeAlias = str | Controlled
+
+
 @dataclass(slots=True)
 class BranchPoint:
     """A point of a curve of equilibria.
@@ -72,13 +76,13 @@ class BranchPoint:
     dual: Array
     sigma: float
 
-    def value(self, quantity: str) -> float:
-        """A quantity of the curve by its name: volume, pressure or center_height."""
-        return self.state.value_of(CONTROLS[quantity])
+    def value(self, quantity: Followed) -> float:
+        """A quantity of the curve: volume, pressure or center_height by its name, or the amount of a gas."""
+        return self.state.value_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
 
-    def rate(self, quantity: str) -> float:
+    def rate(self, quantity: Followed) -> float:
         """Derivative of a quantity with respect to arc length: zero at a fold in that quantity."""
-        return self.rate_of(CONTROLS[quantity])
+        return self.rate_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
 
     def rate_of(self, controlled: Controlled) -> float:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
@@ -119,6 +123,10 @@ class CurveProblem(ABC, Generic[Point]):
     def dual(self, z: Array) -> Array:
         """The mesh-independent inner product with z, as a row."""
 
+    def unit(self, quantity: Followed) -> float:
+        """The unit of a quantity."""
+        return self.units[quantity] if isinstance(quantity, str) else quantity.unit(self.potential.space)
+
     def norm(self, z: Array) -> float:
         """Length of z in that inner product."""
         return math.sqrt(max(float(self.dual(z) @ z), 0.0))
@@ -145,7 +153,7 @@ class CurveProblem(ABC, Generic[Point]):
         """
 
     @abstractmethod
-    def hold(self, quantity: str, value: float, near: Point) -> Point | None:
+    def hold(self, quantity: Followed, value: float, near: Point) -> Point | None:
         """The point at which a quantity has a value exactly, corrected from one near by; None where that is singular."""
 
     @abstractmethod

@@ -154,6 +154,15 @@ class Gas:
         """
         return self.atmosphere * (space.reference_volume + self.chamber)
 
+    def unit(self, space: Space) -> float:
+        """What an amount is compared with.
+
+        Parameters
+        ----------
+        space : Space
+        """
+        return (space.units["pressure"] + self.atmosphere) * (space.units["volume"] + self.chamber)
+
     def refusal(self, pressure: float, volume: float) -> str:
         """Why no amount of the gas holds a state with this pressure and volume; empty where one does.
 
@@ -286,6 +295,14 @@ class Controlled(Protocol):
         space : Space
         """
 
+    def unit(self, space: Space, /) -> float:
+        """What the number is compared with.
+
+        Parameters
+        ----------
+        space : Space
+        """
+
     def refusal(self, pressure: float, volume: float) -> str:
         """Why no load of the control holds a state with this pressure and volume; empty where one does.
 
@@ -339,6 +356,10 @@ class ControlKind:
     def odd(self) -> bool:
         """Volume, pressure and height of a flat membrane change their signs with it."""
         return True
+
+    def unit(self, space: Space, /) -> float:
+        """What it is compared with."""
+        return space.units[self.name]
 
     def refusal(self, pressure: float, volume: float) -> str:
         """Every state has a volume, a pressure and a height."""

@@ -27,8 +27,8 @@ from ..errors import SolveError, Status
 from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .branch import AT_CROSSING, FOLDS, BranchProblem
-from .continuation import BranchPoint, CurveProblem, StepControl, Tracer, trace_points
-from .controls import CONTROLS, Control, PressureControl, at_number
+from .continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
+from .controls import CONTROLS, Control, GasOver, PressureControl, at_number
 from .newton import TOLERANCE, relative_residual, relative_size
 from .search import FAR, Limit
 from .segment import Located, Segment
@@ -68,11 +68,23 @@ class NumberPoint(BranchPoint):
     def number(self) -> float:
         return float(self.z[-1])
 
-    def value(self, quantity: str) -> float:
-        return self.number if quantity == NUMBER else BranchPoint.value(self, quantity)
+    def value(self, quantity: Followed) -> float:
+        return self.number if quantity == NUMBER else BranchPoint.value(self, self._here(quantity))
 
-    def rate(self, quantity: str) -> float:
-        return float(self.tangent[-1]) if quantity == NUMBER else BranchPoint.rate(self, quantity)
+    def rate(self, quantity: Followed) -> float:
+        """Derivative with respect to arc length; a number that moves an end, or is one of a chamber, has a share of its own in it."""
+        if quantity == NUMBER:
+            return float(self.tangent[-1])
+        evaluation, here = self.state.evaluation, self._here(quantity)
+        control = (CONTROLS[here] if isinstance(here, str) else here).at(1.0)
+        rate, family = BranchPoint.rate(self, here), evaluation.potential
+        if not isinstance(family, Family):
+            return rate
+        return rate + control_rate(family, control, self.state.x, self.state.pressure, evaluation) * float(self.tangent[-1])
+
+    def _here(self, quantity: Followed) -> Followed:
+        """A quantity at the number of this point: the gas may be in a chamber that changes."""
+        return quantity.over(self.number) if isinstance(quantity, GasOver) else quantity
 
 
 class Equations:
@@ -188,12 +200,12 @@ class NumberProblem(CurveProblem[NumberPoint]):
             point.z[-1] = guess[-1]
         return point, iterations
 
-    def hold(self, quantity: str, value: float, near: NumberPoint) -> NumberPoint | None:
+    def hold(self, quantity: Followed, value: float, near: NumberPoint) -> NumberPoint | None:
         if quantity == NUMBER:
             guess = near.z.copy()
             guess[-1] = value
             return self.correct(guess, self.number_row, near)[0]
-        control = CONTROLS[quantity].at(value)
+        control = (CONTROLS[quantity] if isinstance(quantity, str) else quantity).at(value)
         return self._newton(near.z, near.borders, lambda equations: _controlled(equations, control), near.dual)[0]
 
     def determinant_sign(self, point: NumberPoint) -> int:

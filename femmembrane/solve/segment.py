@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from ..errors import SolveError
 from ..potential import Array
-from .continuation import CurveProblem, Point
+from .continuation import CurveProblem, Followed, Point
 from .state import hermite
 
 #: a fold that lies this close to a value, relative to its size and one unit, lies on it
@@ -47,7 +47,7 @@ class Segment(Generic[Point]):
         self.problem, self.a, self.b, self.leaving = problem, a, b, leaving
         self.length = b.sigma - a.sigma
         self._known = {0.0: a, 1.0: b}
-        self._folds: dict[str, list[tuple[float, Located[Point]]]] = {}
+        self._folds: dict[Followed, list[tuple[float, Located[Point]]]] = {}
 
     def at(self, share: float) -> Point:
         """The point of the curve at a share of the arc length between the ends.
@@ -67,14 +67,14 @@ class Segment(Generic[Point]):
 
     def folds(self, kind: str) -> list[Located[Point]]:
         """All folds of a kind on the segment: sign changes of the rate, also those that the cubic through the ends shows in pairs."""
-        return [fold for _, fold in self._folds_at(kind)]
+        return [fold for _, fold in self._folds_in(self.problem.folds[kind])]
 
-    def _folds_at(self, kind: str) -> list[tuple[float, Located[Point]]]:
-        """The folds of a kind with their shares of the segment, located once."""
+    def _folds_in(self, quantity: Followed) -> list[tuple[float, Located[Point]]]:
+        """The folds in a quantity with their shares of the segment, located once."""
         if self.leaving:
             return []
-        if kind not in self._folds:
-            quantity = self.problem.folds[kind]
+        if quantity not in self._folds:
+            kind = next((k for k, q in self.problem.folds.items() if q == quantity), "")
             shares = self._brackets(quantity)
             rates = [self.at(s).rate(quantity) for s in shares]
             found = [
@@ -82,16 +82,16 @@ class Segment(Generic[Point]):
                 for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
                 if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
             ]
-            self._folds[kind] = [fold for fold in found if self._turns(quantity, fold[1].point)]
-        return self._folds[kind]
+            self._folds[quantity] = [fold for fold in found if self._turns(quantity, fold[1].point)]
+        return self._folds[quantity]
 
-    def _turns(self, quantity: str, fold: Point) -> bool:
+    def _turns(self, quantity: Followed, fold: Point) -> bool:
         """Whether a quantity moves at all between the ends and a fold; else the signs of its rates are round-off."""
         before, after = self.a.value(quantity), self.b.value(quantity)
         moved = max(abs(fold.value(quantity) - value) for value in (before, after))
-        return moved >= self.problem.resolution * max(self.problem.units[quantity], abs(before))
+        return moved >= self.problem.resolution * max(self.problem.unit(quantity), abs(before))
 
-    def _brackets(self, quantity: str) -> list[float]:
+    def _brackets(self, quantity: Followed) -> list[float]:
         """0, 1, and between them the extremum of the rate where the cubic says that the rate changes sign twice."""
         r0, r1 = (p.rate(quantity) * self.length for p in (self.a, self.b))
         rise = self.b.value(quantity) - self.a.value(quantity)
@@ -138,15 +138,14 @@ class Segment(Generic[Point]):
         apart = max(abs(a.value(q) - b.value(q)) / (unit + abs(a.value(q))) for q, unit in self.problem.units.items())
         return float(apart + a.state.correction + b.state.correction)
 
-    def crossings(self, quantity: str, value: float) -> list[Point]:
+    def crossings(self, quantity: Followed, value: float) -> list[Point]:
         """The points at which a quantity takes a value, in order, each corrected under that control; the first end does not count.
 
         A fold in the quantity between the ends may lie on either side of the value, or on it, within round-off: then it is the point.
         """
-        kind = next(k for k, q in self.problem.folds.items() if q == quantity)
-        shares = [0.0, *(share for share, _ in self._folds_at(kind)), 1.0]
+        shares = [0.0, *(share for share, _ in self._folds_in(quantity)), 1.0]
         ends = [self.at(s).value(quantity) - value for s in shares]
-        least = ON_FOLD * (self.problem.units[quantity] + abs(value))
+        least = ON_FOLD * (self.problem.unit(quantity) + abs(value))
         ends = [ends[0], *(0.0 if abs(e) <= least else e for e in ends[1:-1]), ends[-1]]
         return [
             self.at(high) if b == 0 and high != 1.0 else self._crossing(quantity, value, low, high)
@@ -154,7 +153,7 @@ class Segment(Generic[Point]):
             if b == 0 or a * b < 0
         ]
 
-    def _crossing(self, quantity: str, value: float, low: float, high: float) -> Point:
+    def _crossing(self, quantity: Followed, value: float, low: float, high: float) -> Point:
         if value == 0 and (rest := self.problem.rest_between(self.a, self.b)) is not None:
             a, b = self.a.value(quantity), self.b.value(quantity)
             rest.sigma = self.a.sigma + self.length * a / (a - b)

@@ -13,6 +13,7 @@ from ..potential import Array, potential_of
 from ..results.convergence import COMPARED, PROFILES, ROUND_OFF, Convergence
 from ..results.equilibrium import Equilibrium
 from ..scene import MAX_DEGREE, Scene
+from ..scene.run import GAS
 from ..solve.controls import CONTROLS, Control, control_kind
 from ..solve.finer_space import transferred
 from ..solve.newton import correct
@@ -21,6 +22,7 @@ from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_increasing, check_scene
 from .follow import equilibrium, run
+from .over_number import Hold
 from .state_records import record
 from .trace import trace
 
@@ -113,9 +115,10 @@ def convergence_of_run(scene: Scene, *, degrees: Sequence[int], elements: Sequen
     elif plain.run.until is not None:
         ((name, load),) = plain.run.until.items()
     else:
-        name, load = control_kind(plain.run.control).name, float(plain.run.loads()[-1])
+        kind = plain.run.control
+        name, load = kind if kind == GAS else control_kind(kind).name, float(plain.run.loads()[-1])
     last = branch[-1]
-    return _Study(last.scene, name, CONTROLS[name].at(load), degrees, elements, False).run(scene, load, last)
+    return _Study(last.scene, name, Hold(name, load).control(last.scene), degrees, elements, False).run(scene, load, last)
 
 
 class _Study:

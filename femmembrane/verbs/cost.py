@@ -164,7 +164,7 @@ def asked_load(scene: Scene) -> dict[str, Any]:
     """
     if scene.run is None:
         raise InputError("run", None, "missing; the load that is studied is the last one of [run]")
-    if scene.run.number is not None or scene.run.control == GAS:
+    if scene.run.number is not None or scene.run.control == GAS or GAS in (scene.run.until or ()):
         raise InputError("run.control", scene.run.number or GAS, "a run by volume, pressure, height or arc length is studied")
     if scene.run.control == "arc-length":
         return dict(scene.run.until or {})

@@ -14,8 +14,9 @@ from ..results.equilibrium import Equilibrium
 from ..results.path_memory import TraceMemory
 from ..results.special_point import SpecialPoint
 from ..scene import Scene
+from ..scene.run import GAS
 from ..solve import state_resolution
-from ..solve.continuation import BranchPoint, StepControl
+from ..solve.continuation import BranchPoint, Followed, StepControl
 from ..solve.controls import CONTROLS
 from ..solve.load_path import LoadPath
 from ..solve.number_curve import NUMBER, Borders, ControlledProblem, NumberPoint, first_controlled
@@ -90,7 +91,7 @@ def _checked_targets(until: Mapping[str, float] | None, over: str, hold: Hold) -
     for quantity, value in targets.items():
         if quantity == hold.name:
             raise InputError("until", quantity, "it is held, and never changes")
-        choice("until", quantity, [over, *(name for name in CONTROLS if name != hold.name)])
+        choice("until", quantity, [over, *(name for name in (*CONTROLS, GAS) if name != hold.name)])
         targets[quantity] = number(f"until.{quantity}", value)
     return targets
 
@@ -152,7 +153,9 @@ class NumberTraceRun(OverNumber, TraceRun):
 
     # --- how it is stepped
 
-    def quantity(self, name: str) -> str:
+    def quantity(self, name: str) -> Followed:
+        if name == GAS:
+            return replace(self.request.hold, name=GAS).controlled(self.scene)
         return NUMBER if name == self.request.over else name
 
     def place(self, point: BranchPoint) -> str:

@@ -51,15 +51,15 @@ def trace(
         * a traced branch, which is continued. Its points are part of the result. It keeps its own direction, step and search for special
           points, and the new points are the same to the last bit as without the interruption.
     until : mapping, optional
-        Where to end: values of any of volume, pressure and center_height. The first value that is met ends the trace, and the last point
-        lies exactly on it. The start itself does not count. A value behind the start is met on a distant part of the branch, if at all: see
-        ``direction``. Over a number it may be a value of that, by its name.
+        Where to end: values of any of volume, pressure, center_height and, with a chamber, gas. The first value that is met ends the
+        trace, and the last point lies exactly on it. The start itself does not count. A value behind the start is met on a distant part of
+        the branch, if at all: see ``direction``. Over a number it may be a value of that, by its name.
     over : str, optional
         A number of the scene that changes along the branch in place of the load, such as ``source.0.height``: see
         :mod:`femmembrane.scene.variation`. It sets out from its value in ``scene``, and every equilibrium has its own scene.
     hold : mapping, optional
-        What is held meanwhile: a value of one of volume, pressure and center_height. The membrane is first brought there from ``start``;
-        without a start, as :func:`equilibrium` finds it.
+        What is held meanwhile: a value of one of volume, pressure, center_height and gas. The membrane is first brought there from
+        ``start``; without a start, as :func:`equilibrium` finds it.
     direction : {1, -1}, optional
         1 (default) sets out towards larger volume. Over a number it sets out towards larger numbers; the default is then the way to the
         number in ``until``. From a branch point it names a half of the crossing branch: on half 1 the volume grows. Where the

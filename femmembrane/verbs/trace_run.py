@@ -10,16 +10,16 @@ from typing import Any, Self, TypeAlias
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
-from ..quantities import PLACES
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.path_memory import TraceMemory
 from ..results.special_point import SpecialPoint
 from ..scene import Scene
+from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import stopped_by_source, touches_source
-from ..solve.continuation import BranchPoint, CurveProblem, StepControl, Tracer, trace_points
+from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
@@ -29,6 +29,7 @@ from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossin
 from ..stability.azimuthal import azimuthal_eigenvalue
 from .arguments import check_height, check_ill_posed, check_max_steps
 from .meshing import carried
+from .over_number import gas_of
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
 
@@ -132,7 +133,7 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
         raise InputError("until", until, "a mapping is allowed, such as {'center_height': 5.0}")
     targets = dict(until or {})
     for quantity, value in targets.items():
-        choice("until", quantity, PLACES)
+        choice("until", quantity, HELD)
         targets[quantity] = number(f"until.{quantity}", value)
     return targets
 
@@ -193,6 +194,8 @@ class TraceRun(Run[Branch]):
         super().__init__(scene, potential or potential_of(scene), ("setup", "solve", "special_points", "verdicts"))
         if "center_height" in request.targets:
             check_height("until.center_height", self.potential)
+        if GAS in request.targets:
+            gas_of(scene, "until")
         self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
         self.tracer = Tracer(Predictor(), request.steps.first, request.steps)
         self.special: list[SpecialPoint] | None = [] if request.special_points else None
@@ -302,9 +305,9 @@ class TraceRun(Run[Branch]):
         self.point, self.regular = new, len(self.found)
         return self._ill_posed(new) or self._at_source(new) or self.at_bound(new)
 
-    def quantity(self, name: str) -> str:
+    def quantity(self, name: str) -> Followed:
         """The quantity of the curve that a target names."""
-        return name
+        return gas_of(self.scene, "until") if name == GAS else name
 
     def potential_at(self, point: BranchPoint) -> Potential:
         """The potential of the scene of a point."""

@@ -9,6 +9,7 @@ import pytest
 
 import femmembrane as fm
 from femmembrane.errors import InputError
+from femmembrane.verbs.convergence import convergence_of_run
 from tests.cases import OGDEN, disc_scene
 
 CHAMBER = fm.Chamber(volume=1.0, atmosphere=0.5)
@@ -84,3 +85,38 @@ def test_what_is_refused() -> None:
         fm.Chamber(volume=0.0)
     with pytest.raises(InputError, match=r"chamber\.volume"):
         fm.vary(scene(), "chamber.volume", [1.0, -1.0], hold={"gas": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("over", "hold"),
+    [
+        ({}, None),
+        ({"over": "chamber.volume"}, {"pressure": 1.0}),
+        ({"over": "chamber.atmosphere"}, {"volume": 1.0}),
+        ({"over": "membrane.prestretch"}, {"pressure": 1.0}),
+    ],
+)
+def test_a_trace_ends_at_an_amount(over: dict[str, str], hold: dict[str, float] | None) -> None:
+    """The last state lies on the amount exactly, in the chamber that its own scene has."""
+    branch = fm.trace(scene(), until={"gas": 8.0 if not over else 5.0}, hold=hold, **over)  # type: ignore[arg-type]
+    assert branch.status is fm.Status.CONVERGED
+    assert branch[-1].gas_amount == pytest.approx(8.0 if not over else 5.0, rel=1e-12)
+    if not over:
+        assert fm.equilibrium(scene(), gas=fm.Gas(8.0, 1.0, 0.5)).volume == pytest.approx(branch[-1].volume, rel=1e-10)
+    assert fm.run(scene(run=fm.Run(control="arc-length", start=0.5, until={"gas": 3.0})))[-1].gas_amount == pytest.approx(3.0, rel=1e-12)
+
+
+def test_until_gas_needs_a_chamber_and_is_not_held() -> None:
+    with pytest.raises(InputError, match="no chamber of gas"):
+        fm.trace(scene().replace(chamber=None), until={"gas": 1.0})
+    with pytest.raises(InputError, match=r"chamber.*missing"):
+        scene(run=fm.Run(control="arc-length", start=0.5, until={"gas": 3.0})).replace(chamber=None)
+    with pytest.raises(InputError, match="it is held"):
+        fm.trace(scene(), over="chamber.volume", hold={"gas": 3.0}, until={"gas": 4.0})
+
+
+@pytest.mark.parametrize("run", [fm.Run(control="gas", values=(3.0,)), fm.Run(control="arc-length", start=0.5, until={"gas": 3.0})])
+def test_the_error_of_a_run_of_gas_is_studied_at_its_last_amount(run: fm.Run) -> None:
+    study = convergence_of_run(scene(run=run), degrees=(1, 2), elements=(4, 8))
+    assert (study.control, study.load) == ("gas", 3.0)
+    assert study.errors["volume"][1, 1] < 1e-4 < study.errors["volume"][0, 0]

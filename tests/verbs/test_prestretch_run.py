@@ -57,3 +57,14 @@ def test_the_limit_point_of_a_three_term_ogden_disc_vanishes_at_some_stretch() -
 def test_where_it_cannot_be() -> None:
     assert STRETCH in names(SCENE)
     assert STRETCH not in names(fm.Scene(material=fm.NeoHookean(), mesh=fm.cap(height=0.3)))
+
+
+def test_a_volume_fold_over_the_stretch_is_where_the_volume_is_stationary() -> None:
+    """The rim takes volume with it: V has a minimum in p at P = 0.5, and equilibria on both sides of it hold more."""
+    branch = fm.trace(SCENE, over=STRETCH, hold={"pressure": 0.5}, until={STRETCH: 1.3})
+    (fold,) = [p for p in branch.special_points or () if p.kind == "volume_fold"]
+    p, h = fold.equilibrium.scene.prestretch, 1e-3
+    below, above = (fm.equilibrium(SCENE.replace(prestretch=p + step), pressure=0.5).volume for step in (-h, h))
+    curvature = (below + above - 2 * fold.volume) / h**2
+    assert curvature > 1
+    assert abs(above - below) / (2 * h) < 0.01 * curvature * h + 1e-5

@@ -69,6 +69,7 @@ def sweep(
         --pressure and --volume are meant as in the scene file.
     """
     from ..quantities import Units
+    from ..scene.given import shown_as_given
     from ..scene.keys import values_of
     from ..scene.laboratory import values_in_file
     from ..verbs.sweep import plan_sweep
@@ -83,14 +84,17 @@ def sweep(
             None if load is None else asked.scales.from_si(name, load) for name, load in (("pressure", pressure), ("volume", volume))
         )
     grid: dict[str, Any] = {}
+    given: list[tuple[str, Any, Any]] = []
     for text in over:
         key, values = values_of("--over", text)
         if key in grid:
             raise InputError("--over", text, "each key once is allowed")
         grid[key] = values_in_file(tables, key, values)
+        given += ((key, one, value) for one, value in zip(values, grid[key], strict=True))
     what: dict[str, Any] = {"quantity": quantity, "pressure": pressure, "volume": volume, "direction": direction, "workers": workers}
     if dry_run:
-        say(f"{plan_sweep(asked, grid, out=out, **what)}\n")
+        with shown_as_given(tables, given):
+            say(f"{plan_sweep(asked, grid, out=out, **what)}\n")
         return DONE
     done = [0, 0]
     with working(out, ("sweep.nc", "sweep.png", "scenes.sqlite")), Interrupts() as interrupts, _observer() as progress:
@@ -101,7 +105,8 @@ def sweep(
             interrupts.check()
 
         try:
-            found = compute(asked, grid, scheduler=scheduler, out=out, on_scene=on_scene, **what)
+            with shown_as_given(tables, given):
+                found = compute(asked, grid, scheduler=scheduler, out=out, on_scene=on_scene, **what)
             interrupts.check()
         except InputError as error:
             if error.key == "out" and done[0]:

@@ -7,27 +7,33 @@ of an error is its path in the tables, and what stands there is what the user wr
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from ..checks import is_number
 from ..errors import InputError
 from ..physics.units import has_unit
+from .keys import set_key
 
 
 @contextmanager
-def shown_as_given(data: Any) -> Iterator[None]:
+def shown_as_given(data: Any, over: Iterable[tuple[str, Any, Any]] = ()) -> Iterator[None]:
     """Let errors about converted numbers show them as they stand in the tables of a scene file.
 
     Parameters
     ----------
     data : mapping
         Tables in the units of a laboratory.
+    over : iterable of (str, object, object), optional
+        Values that take the place of those in the tables, one scene for each: their key, as given, and converted.
     """
     try:
         yield
     except InputError as error:
+        for key, one, value in over:
+            if _same(value, error.value):
+                data = set_key(data, key, one)
         given = _given(data, error.key)
         if given is None or not _is_measured(given, data.get("units") == "si") or _same(given, error.value):
             raise

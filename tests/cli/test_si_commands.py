@@ -88,3 +88,21 @@ def test_si_units_need_scales(path, tmp_path, capfd):
         assert main([command[0], str(path), *command[1:], "--out", str(tmp_path / "out"), "--units", "si"]) == 2
         assert "units = 'si': the scene has no [scales]" in capfd.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("extra", [[], ["--dry-run"]])
+@pytest.mark.parametrize("units", ["si", "scaled"])
+def test_errors_of_a_sweep_show_its_values_as_given(path, tmp_path, capfd, extra, units):
+    path.write_text(FILE.replace('"si"', f'"{units}"').replace("3e-4", '"0.3 mm"').replace("1000", '"1 kPa"'), encoding="utf-8")
+    words = [
+        "--over",
+        "mesh.inner_radius=5 mm,50 mm",
+        "--set",
+        "mesh.shape=annulus",
+        "--set",
+        "mesh.inner_radius=4 mm",
+        "--quantity",
+        "run",
+    ]
+    assert main(["sweep", str(path), *words, "--out", str(tmp_path / "out"), *extra]) == 2
+    assert "mesh.inner_radius = '50 mm': a number between 0 and 1" in capfd.readouterr().err

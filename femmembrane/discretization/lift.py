@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,44 @@ class Lift:
         c, c_s = c0 + (c1 - c0) * share, (c1 - c0) / (last - first)
         slope = np.full_like(share, (d1 - d0) / (last - first))
         return np.stack([c * R, c * R_s + c_s * R, d0 + (d1 - d0) * share, slope])
+
+
+@dataclass(frozen=True)
+class Moving:
+    """The lift of all values of a number m that moves an end: ``rest`` + ``share`` times ``unit``.
+
+    Attributes
+    ----------
+    share : Any
+        m minus the value at which the end is where it rests; a symbol, where m is one.
+    at : float
+        The value of m in the scene with which the space was built.
+    rest, unit : Lift or None, Lift
+        The part that stays, and what m adds for each unit.
+    sliding : (float, float)
+        1 at an end of radius m that slides along a wall of this radius, else 0.
+    wall : Any
+        What m adds to the squared radius of that wall in the space.
+    """
+
+    share: Any
+    at: float
+    rest: Lift | None
+    unit: Lift
+    sliding: tuple[float, float] = (0.0, 0.0)
+    wall: Any = 0.0
+
+    @classmethod
+    def between(cls, share: Any, at: float, rest: Lift | None, lift: Lift, size: float) -> Moving:
+        """The lift that is ``rest`` at the share 0 and ``lift`` at the share ``size``."""
+        radial, axial = (0.0, 0.0), (0.0, 0.0)
+        if rest is not None:
+            radial, axial = rest.radial, rest.axial
+
+        def rates(to: tuple[float, float], start: tuple[float, float]) -> tuple[float, float]:
+            return (to[0] - start[0]) / size, (to[1] - start[1]) / size
+
+        return cls(share, at, rest, Lift(rates(lift.radial, radial), rates(lift.axial, axial), lift.ends))
 
 
 def lift_of(mesh: Meridian, prestretch: float) -> Lift | None:

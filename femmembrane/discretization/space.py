@@ -20,6 +20,7 @@ from scipy import sparse
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
 from .elements import lagrange, lobatto, shape_functions
+from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
 
@@ -128,11 +129,15 @@ class Space(Numbering):
     @cached_property
     def lifting(self) -> Array:
         """(u, u_x, w, w_x) of the lift at the quadrature points, shape (4, n_quadrature, n_elements)."""
-        if self.lift is None:
+        return self.lifting_of(self.lift)
+
+    def lifting_of(self, lift: Lift | None) -> Array:
+        """The same of any lift of this meridian."""
+        if lift is None:
             return np.zeros((4, *self.s.shape))
-        lift = self.lift.at(self.mesh, self.s)
-        lift[1::2] *= self.sizes
-        return lift
+        values = lift.at(self.mesh, self.s)
+        values[1::2] *= self.sizes
+        return values
 
     def at_quadrature(self, x: Array) -> Array:
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""

@@ -94,6 +94,8 @@ class End(Mapping[str, Any]):
         return sum(1 for _ in self)
 
 
+#: names of the ends of meridians, of every shape
+ENDS = ("inner", "outer", "rim", "top", "bottom", "first", "last")
 POLE = Support(frozenset("u"))
 CLAMPED = "clamped"
 #: by their names in scene files

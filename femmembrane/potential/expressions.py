@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 #: columns of data that hold the displacement beside which the unknowns count
 LIFT = ("lift_u", "lift_u_x", "lift_w", "lift_w_x")
+#: and those of what the number of a family adds to it for each unit
+MOVE = ("move_u", "move_u_x", "move_w", "move_w_x")
 #: held while expressions are built: CasADi has one mode, for all threads, of multiplying symbols
 BUILDING = Guard()
 
@@ -66,8 +68,12 @@ def point_expressions(
     flat = "Z" not in columns
     R, R_x, weight, Z, Z_x = (data[columns.index(c)] if c in columns else ca.SX(0) for c in ("R", "R_x", "weight", "Z", "Z_x"))
     own_w, own_w_x = local[2], local[3]
-    share = getattr(scene, "lifted", 1.0)  # of the lift, where that is the number of a family
-    u, u_x, w, w_x = (local[k] + share * data[columns.index(name)] if name in columns else local[k] for k, name in enumerate(LIFT))
+    way = getattr(scene, "lifted", None)
+    shares = (1.0, 0.0 if way is None else way.share)
+    u, u_x, w, w_x = (
+        sum((share * data[columns.index(name)] for share, name in zip(shares, pair, strict=True) if name in columns), local[k])
+        for k, pair in enumerate(zip(LIFT, MOVE, strict=True))
+    )
     e1, e2 = hencky_strains(R, R_x, Z_x, u, u_x, w_x)
     area = weight * R * (R_x if flat else np.sqrt(R_x**2 + Z_x**2))
     if "thickness" in columns:
@@ -86,7 +92,11 @@ def point_expressions(
     hessian = area * (ca.mtimes([slopes.T, tangent, slopes]) + bending)
     enclosed = lidded_volume_density(R + u, Z_x + w_x) if space.lids else volume_density(R + u, R_x + u_x, Z + w)
     if "wall" in columns:
-        enclosed = enclosed + wall_density(data[columns.index("wall")], data[columns.index("wall_x")], own_w, own_w_x)
+        wall, wall_x = (data[columns.index(name)] for name in ("wall", "wall_x"))
+        if "move_wall" in columns and way is not None:
+            wall = wall + way.wall * data[columns.index("move_wall")]
+            wall_x = wall_x + way.wall * data[columns.index("move_wall_x")]
+        enclosed = enclosed + wall_density(wall, wall_x, own_w, own_w_x)
     inside = weight if space.side > 0 else -weight
     volume = inside * enclosed
     magnetic = ca.SX(0)

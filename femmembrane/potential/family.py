@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from ..discretization.lift import Moving
 from ..discretization.space import space_of_scene
 from ..errors import InputError
 from ..kernels.interface import Array, Elements
@@ -76,7 +77,7 @@ class Family(Potential):
         with casadi_answers_numpy():
             member = vary(number)
             super().__init__(member, quadrature)
-        self.moves = hasattr(member, "lifted")
+        self._way: Moving | None = getattr(member, "lifted", None)
         self.electric = self.scene.electricity  # of the family: with the number as a symbol, or another than that of the scene below
         self._vary = vary
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
@@ -93,6 +94,19 @@ class Family(Potential):
 
     def charge_squared(self, factor: float) -> float:
         return float(self._vary(factor).electricity.total_charge) ** 2
+
+    @property
+    def moves(self) -> bool:
+        """Whether the number moves an end of the membrane."""
+        return self._way is not None
+
+    def pole_rise(self, factor: float) -> float:
+        return 0.0 if self._way is None else self.pole_rate * (factor - self._way.at)
+
+    @property
+    def pole_rate(self) -> float:
+        """Derivative of the height of the pole, at fixed unknowns, with respect to the number."""
+        return 0.0 if self._way is None else self._way.unit.axial[0]
 
     def member(self, number: float) -> Member:
         """The potential of the scene that has a value of the number. Nothing is built for it; the last ones are kept.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import casadi as ca
 import numpy as np
 
+from ..discretization.lift import Moving
 from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
@@ -28,7 +29,7 @@ from ..physics.response import ELECTRODE, local_square, response_columns, respon
 from ..physics.sheet import Sheet
 from ..threads import cached_property
 from .charge import Charged
-from .expressions import BUILDING, LIFT, casadi_answers_numpy, point_expressions, point_rows, response_expressions
+from .expressions import BUILDING, LIFT, MOVE, casadi_answers_numpy, point_expressions, point_rows, response_expressions
 from .magnetic import wave_function
 from .nearby import Nearby
 from .replay import PointProgram, Replay, at_points
@@ -218,11 +219,14 @@ class Potential:
         self.level = not (space.Z.any() or space.Z_x.any())
         self.strained = space.strained or self.prestressed
         self.flat = self.level and not self.strained
+        way: Moving | None = getattr(scene, "lifted", None)
         columns = {"R": space.R, "R_x": space.R_x, "weight": space.weights}
         if not self.level:
             columns |= {"Z": space.Z, "Z_x": space.Z_x}
         if space.wall is not None:
             columns |= {"wall": space.wall[0], "wall_x": space.wall[1]}
+        if way is not None and any(way.sliding):
+            columns |= dict(zip(("move_wall", "move_wall_x"), space.between(list(way.sliding)), strict=True))
         if forces is not None:
             columns |= dict(zip(("hub", "hub_x"), space.between([-1.0, 0.0]), strict=True))
         if self.sheet is not None:
@@ -230,13 +234,18 @@ class Potential:
         if self.magnetisation is not None and isinstance(self.magnetisation.remanence, Along):
             columns["remanence"] = remanence_column(self.magnetisation, space.R, space.Z, space.s, space.side)
         columns |= response_columns(scene, space.R, space.Z, space.s)
-        if space.lift is not None:
-            columns |= {name: part for name, part in zip(LIFT, space.lifting, strict=True) if part.any()}
+        for names, lift in ((LIFT, space.lift), (MOVE, None)) if way is None else ((LIFT, way.rest), (MOVE, way.unit)):
+            if lift is not None:
+                columns |= {name: part for name, part in zip(names, space.lifting_of(lift), strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with casadi_answers_numpy():
             self.symbols, self.terms = point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
+
+    def pole_rise(self, factor: float) -> float:
+        """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
+        return 0.0
 
     @property
     def surrounded(self) -> bool:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ..checks import choice, is_number
+from ..discretization.supports import ENDS
 from ..errors import InputError, unknown_name
 from ..physics.scales import AGREEMENT, Scales
 from ..physics.units import has_unit, in_unit
@@ -42,8 +43,6 @@ _KINDS: Mapping[str, Mapping[str, str]] = {
     "electric": {"voltage": "V", "total_charge": "C", "frozen_charge": "C/m^2", "breakdown": "V/m", "from": "length", "to": "length"},
     "mesh": {"radii": "length", "points": "length", "inner_radius": "length", "height": "length", "length": "length", "radius": "length"},
 }
-#: keys of [mesh] that say how an end is held, and where
-_ENDS = ("inner", "outer", "rim", "top", "bottom", "first", "last")
 #: what may stand for the strength of a source, the one without a unit first
 _STRENGTHS: Mapping[str, tuple[str, ...]] = {
     "dipole": ("A m^2",),
@@ -215,7 +214,7 @@ class _Laboratory:
 
     def _mesh(self, table: Mapping[str, Any]) -> dict[str, Any]:
         changed = self._table("mesh", table, _KINDS["mesh"])
-        for name in _ENDS:
+        for name in ENDS:
             if isinstance(table.get(name), Mapping):
                 changed[name] = self._table(f"mesh.{name}", table[name], _KINDS["mesh"])
         if "file" in table and (self.si or isinstance(table.get("unit"), str)):

@@ -6,6 +6,7 @@
 ``electric.NAME``        what is given of ``electric.voltage``, ``electric.total_charge`` and ``electric.frozen_charge``
 ``membrane.susceptibility``  chi; ``membrane.saturation`` and ``membrane.remanence``, where they are numbers
 ``membrane.prestretch``  p of a flat disc or annulus, or of a tube
+``mesh.END.radius``      place of an end that has one in the scene: ``mesh.rim.radius``, ``mesh.top.height``
 ``chamber.NAME``         volume or atmosphere of the chamber of gas
 ``material.NAME``        a number of a material that has such an argument; others change with it where its ``numbers_with`` says so
 ``material.mu.K``        modulus K of Ogden's material (from 0); the other moduli are scaled by one factor
@@ -20,6 +21,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
 from types import SimpleNamespace
@@ -27,12 +29,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..discretization.lift import lift_of
+from ..discretization.lift import Lift, Moving, lift_of
+from ..discretization.supports import ENDS, as_support
 from ..errors import InputError, unknown_name
 from ..physics.magnetisation import Magnetisation
 from ..physics.materials import Ogden
 
 if TYPE_CHECKING:
+    from ..discretization.meridian import Meridian
     from .value import Scene
 
 #: added to a strength, so that its square root can be differentiated at zero; strengths above 1e-284 do not change
@@ -79,6 +83,9 @@ class Parameter:
             return float(getattr(self.scene, rest) or 0.0)
         if part in _OBJECTS:
             return float(getattr(getattr(self.scene, part), rest))
+        if part == "mesh":
+            end, _, direction = rest.partition(".")
+            return float(getattr(self.scene.mesh, end)[direction])
         place, _, name = rest.rpartition(".") if part in _LISTS else ("", "", rest)
         owner = getattr(self.scene, _LISTS[part])[int(place)] if part in _LISTS else self.scene.material
         key, _, index = name.partition(".")
@@ -98,6 +105,8 @@ class Parameter:
         part, _, rest = self.name.partition(".")
         if part == "membrane":
             return self.scene.replace(**{rest: value})
+        if part == "mesh":
+            return self.scene.replace(mesh=self._mesh_at(value))
         if part in _OBJECTS:
             return self.scene.replace(**{part: dataclasses.replace(getattr(self.scene, part), **{rest: value})})
         if part == "material":
@@ -124,7 +133,7 @@ class Parameter:
         loads: tuple[Any, ...] = scene.loads
         susceptibility, electricity = scene.susceptibility, scene.electricity
         magnetisation = {name: getattr(scene, name) for name in MAGNETISATION}
-        lifted: dict[str, Any] = {}
+        moved: dict[str, Any] = {}
         if part == "chamber":  # of the control, and of no potential
             pass
         elif part == "electric":
@@ -132,7 +141,9 @@ class Parameter:
             unit = 1.0 if given.relative_permittivity is None else given.units(scene.scales)[rest]
             electricity = _unchecked(dataclasses.replace(given, **{rest: 1.0}).plain(scene.scales), **{rest: value / unit})
         elif rest == "prestretch":  # the lift of p is p - 1 times that of 2
-            lifted = {"prestretch": 2.0, "lifted": value - 1}
+            moved = {"prestretch": 2.0, "lifted": Moving.between(value - 1, 2.0, None, _lift(scene.mesh, 2.0), 1.0)}
+        elif part == "mesh":
+            moved = self._moved(value)
         elif part == "membrane" and rest in magnetisation:
             magnetisation[rest] = value
         elif part == "membrane" and Magnetisation.of(scene) is not None:
@@ -154,7 +165,28 @@ class Parameter:
             sources = (*sources[:index], changed[index], *sources[index + 1 :])
         parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility, "electricity": electricity}
         kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
-        return SimpleNamespace(**parts, **magnetisation, **{**{name: getattr(scene, name) for name in kept}, **lifted})
+        return SimpleNamespace(**parts, **magnetisation, **{**{name: getattr(scene, name) for name in kept}, **moved})
+
+    def _mesh_at(self, value: float | None) -> Meridian:
+        """The mesh with this place of the end; None is where the end rests."""
+        end, _, direction = self.name.removeprefix("mesh.").partition(".")
+        mesh: Any = self.scene.mesh
+        placed: Meridian = dataclasses.replace(mesh, **{end: {**getattr(mesh, end), direction: value}})
+        return placed
+
+    def _moved(self, value: Any) -> dict[str, Any]:
+        """The lift over the place of an end, and a mesh on which that is somewhere else than at rest."""
+        mesh, (end, direction) = self.scene.mesh, self.name.split(".")[1:]
+        at_ends = mesh.position(mesh.breakpoints()[[0, -1]])
+        size = float(at_ends[0].max())
+        place = _place(mesh, end) or 0
+        rest = float(at_ends[direction == "height"][place])
+        at = self.value if self.value != rest else rest + size
+        unmoved = lift_of(self._mesh_at(None), self.scene.prestretch)
+        way = Moving.between(value - rest, at, unmoved, _lift(self._mesh_at(rest + size)), size)
+        if as_support(mesh.supports()[place]).wall and direction == "radius":
+            way = dataclasses.replace(way, sliding=(1.0, 0.0) if place == 0 else (0.0, 1.0), wall=value**2 - at**2)
+        return {"mesh": self._mesh_at(at), "lifted": way}
 
     def _check_modulus(self, value: float, alpha: float) -> None:
         if not 0 < value * alpha < 2:
@@ -189,12 +221,32 @@ def names(scene: Scene) -> list[str]:
         found += [f"membrane.{name}" for name in ("saturation", "remanence") if isinstance(getattr(scene, name), Real)]
     if _can_be_stretched(scene):
         found.append("membrane.prestretch")
+    found += [
+        f"mesh.{end}.{direction}"
+        for end in ENDS
+        if isinstance(held := getattr(scene.mesh, end, None), Mapping) and _place(scene.mesh, end) is not None
+        for direction in ("radius", "height")
+        if direction in held
+    ]
     if getattr(scene, "chamber", None) is not None:
         found += [f"chamber.{name}" for name in _numbers(scene.chamber)]
     material = scene.material
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]
     return found + [f"material.{name}" for name in _numbers(material)]
+
+
+def _place(mesh: Any, end: str) -> int | None:
+    """Which of the two points of a meridian is the end with a name; None where that is a pole."""
+    bare = dataclasses.replace(mesh, **{end: getattr(mesh, end)["kind"]})
+    return next((k for k, (own, other) in enumerate(zip(mesh.supports(), bare.supports(), strict=True)) if own != other), None)
+
+
+def _lift(mesh: Meridian, prestretch: float = 1.0) -> Lift:
+    lift = lift_of(mesh, prestretch)
+    if lift is None:  # no caller asks where every end rests
+        raise InputError("mesh", mesh, "an end with another place than the one at which it rests is allowed")
+    return lift
 
 
 def _can_be_stretched(scene: Scene) -> bool:

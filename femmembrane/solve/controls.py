@@ -68,7 +68,8 @@ class CenterHeightControl:
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         row = np.zeros(space.n_free)
         row[space.pole] = 1.0
-        return space.center_height(x) - self.height, row, 0.0
+        height = space.center_height(x) + evaluation.potential.pole_rise(evaluation.factor)
+        return height - self.height, row, 0.0
 
 
 @dataclass(frozen=True)

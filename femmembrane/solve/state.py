@@ -51,7 +51,9 @@ class State:
 
     def value_of(self, controlled: Controlled) -> float:
         """The number that a control holds, in this state."""
-        return controlled.value(self.evaluation.potential.space, self.x, self.pressure, self.volume)
+        potential = self.evaluation.potential
+        value = controlled.value(potential.space, self.x, self.pressure, self.volume)
+        return value + potential.pole_rise(self.evaluation.factor) if controlled.name == "center_height" else value
 
 
 def rests_flat(potential: Potential) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Family, Potential
-from .controls import Control, Gas, GasOver, VolumeControl
+from .controls import CenterHeightControl, Control, Gas, GasOver, VolumeControl
 from .newton import NewtonResult, correct
 from .state import Predictor, State, distance, joined
 from .wellposed import apparent, is_slack, slackness
@@ -120,7 +120,9 @@ def _through_source(potential: Potential, before: State, after: State, parameter
 def control_rate(family: Family, control: Control, x: Array, pressure: float, evaluation: Evaluation) -> float:
     """Derivative of the equation of a control with respect to the number of a family, at a fixed (x, P)."""
     rate = control.number_rate(pressure, evaluation.volume) if isinstance(control, GasOver) else 0.0
-    if isinstance(control, VolumeControl):
+    if isinstance(control, CenterHeightControl):
+        rate += family.pole_rate
+    elif isinstance(control, VolumeControl):
         rate += family.volume_derivative(x, evaluation.factor)
     elif isinstance(control, Gas):
         rate += (pressure + control.atmosphere) * family.volume_derivative(x, evaluation.factor)

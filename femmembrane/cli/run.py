@@ -140,10 +140,13 @@ def partial_branch(scene: Scene, equilibria: Sequence[Equilibrium], status: Stat
     """The branch of the equilibria found before the computation ended early. Special points are not searched for."""
     from ..results.branch import Branch
 
-    # its mesh may have been chosen on the way
-    used = scene.replace(mesh=equilibria[0].scene.mesh, degree=equilibria[0].scene.degree) if equilibria else scene
-    asked = used.run
+    asked = scene.run
     over, hold = (asked.number or "", dict(asked.hold or {})) if asked is not None else ("", {})
+    used = scene
+    if equilibria:  # the mesh may have been chosen on the way; over a number each has a scene of its own
+        first = equilibria[0].scene
+        used = scene.replace(mesh=first.mesh, degree=first.degree) if over else first
+        asked = used.run
     solver = asked.solver if asked is not None and asked.minimised else "newton"
     return Branch(scene=used, equilibria=tuple(equilibria), status=status, message=message, solver=solver, over=over, hold=hold)
 

@@ -16,7 +16,7 @@ TEMPLATE = """\
 # A scene: what exists and what is asked of it. Lengths are in units of the radius of the rim, stresses in units of the shear
 # modulus. Only what stands here is built and computed; remove the # before a line to ask for it.
 title = "{title}"
-# units = "si"                           # numbers in m, m^3, Pa, ...; with or without it "5 kPa", "20 mm": both need [scales]
+# With units = "si" here, numbers are in m, m^3, Pa, ...; "5 kPa" and "20 mm" are understood in any case. Both need [scales].
 
 # [scales]
 # radius = "25 mm"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -80,6 +80,8 @@ class Family(Potential):
         self._way: Moving | None = getattr(member, "lifted", None)
         self.electric = self.scene.electricity  # of the family: with the number as a symbol, or another than that of the scene below
         self._vary = vary
+        if scene.electric is not None and self.electric is not None and scene.electricity is None:  # the member with 0 says nothing of it
+            scene = scene.replace(electric=replace(scene.electric, **{scene.electric.load: 1.0}))
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         self.magnetisation = Magnetisation.of(scene) if scene.sources else None
         slot = self.symbols[2][1]

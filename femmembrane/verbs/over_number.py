@@ -138,5 +138,7 @@ class OverNumber:
         if self.parameter.name.startswith("chamber.") or self.family.moves:
             return
         family, value = self.family, state.evaluation.factor
+        if self.parameter.name.startswith("electric."):  # forces are even in it: at 0 all derivatives vanish
+            value = value or 1.0
         if not np.any(family.number_derivative(state.x, state.pressure, value)):
             raise InputError("over", self.parameter.name, "it changes no force on this membrane, so that nothing would happen")

@@ -224,6 +224,11 @@ def at_number(control: Control, number: float) -> Control:
     return control.over(number) if isinstance(control, GasOver) else control
 
 
+def is_held(held: Controlled, state_value: float, value: float, space: Space) -> bool:
+    """Whether a state has a value of what is held already, within round-off: at a fold no steps lead from one to the other."""
+    return abs(state_value - value) <= 1e-11 * (held.unit(space) + abs(value))
+
+
 @dataclass(slots=True, eq=False)
 class ArcLengthControl:
     """Pseudo-arc length: <tangent, (x, P) - (prediction)> = 0. ``dual`` is the tangent with the inner product already applied."""

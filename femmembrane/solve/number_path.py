@@ -8,7 +8,7 @@ from dataclasses import replace
 from ..errors import SolveError, Status
 from ..potential import Family, Potential, potential_of
 from .branch import BranchProblem, first_point
-from .controls import ArcLengthControl, Control, Controlled, GasOver, at_number
+from .controls import ArcLengthControl, Control, Controlled, GasOver, at_number, is_held
 from .load_path import SOLVERS, LoadPath, NumberTurn, Turn
 from .minimize import is_minimum, minimize_and_verify
 from .newton import correct
@@ -109,6 +109,8 @@ class NumberPath:
         return potential_of(member.scene) if built else member
 
     def _brought(self, path: LoadPath, state: State, load: float) -> State:
+        if is_held(path.held, state.value_of(path.held), self.value, state.evaluation.potential.space):
+            return self._here(state, load)
         path.set_out(state, state.value_of(path.held))
         return self._here(path.to(self.value, False)[0], load)
 

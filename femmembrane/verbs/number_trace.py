@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..scene.run import GAS
 from ..solve import state_resolution
 from ..solve.continuation import BranchPoint, Followed, StepControl
-from ..solve.controls import CONTROLS
+from ..solve.controls import CONTROLS, is_held
 from ..solve.load_path import LoadPath
 from ..solve.number_curve import NUMBER, Borders, ControlledProblem, NumberPoint, first_controlled
 from ..solve.segment import Located, Segment
@@ -131,6 +131,8 @@ class NumberTraceRun(OverNumber, TraceRun):
             start = start.equilibrium
         state = first_state(potential, start)
         path = LoadPath(potential, hold.controlled(self.scene), "newton")
+        if is_held(path.held, state.value_of(path.held), hold.value, potential.space):
+            return state
         path.set_out(state, state.value_of(path.held))
         return path.to(hold.value, False)[0]
 

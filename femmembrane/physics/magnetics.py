@@ -163,7 +163,7 @@ class Dipole(Source):
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
         z = eta - self.height
         inverse = 1 / (rho**2 + z**2)
-        amplitude = self.orientation * math.sqrt(self.strength) * inverse**2 * inverse**0.5
+        amplitude = self.orientation * root(self.strength) * inverse**2 * inverse**0.5
         return 3 * z * rho * amplitude, (2 * z**2 - rho**2) * amplitude, 0.0
 
     @_anywhere
@@ -183,6 +183,11 @@ class Dipole(Source):
     def outline(self) -> Outline:
         """A point with an arrow along its moment."""
         return Outline(f"dipole at height {self.height:g}", ((0.0, self.height),), self.orientation)
+
+
+def root(strength: Any) -> Any:
+    """The square root of a strength, a number or a symbol."""
+    return math.sqrt(strength) if isinstance(strength, (int, float)) else np.sqrt(strength)
 
 
 def check_source(source: Any) -> None:
@@ -221,9 +226,9 @@ def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, 
     return sum(f[0] for f in fields), sum(f[1] for f in fields), sum(f[2] for f in fields)
 
 
-def magnetic_energy_density(sources: Sequence[Source], susceptibility: float, rho: Any, eta: Any) -> Any:
+def magnetic_energy_density(sources: Sequence[Source], susceptibility: Any, rho: Any, eta: Any) -> Any:
     """-chi/2 |h|^2 per reference area, in units of mu T."""
-    return -susceptibility / 2 * field_intensity(sources, rho, eta)
+    return -0.5 * susceptibility * field_intensity(sources, rho, eta)
 
 
 def field_intensity(sources: Sequence[Source], rho: Any, eta: Any) -> Any:

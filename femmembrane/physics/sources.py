@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import store, whole
-from .magnetics import Source, check_source
+from .magnetics import Source, check_source, root
 from .outline import Outline
 
 #: steps of the arithmetic-geometric mean: round-off at distances from the wire down to 1e-6 of its radius
@@ -64,7 +64,7 @@ class Loop(Source):
         return ((self.radius, self.height),)
 
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
-        amplitude = self.orientation * math.sqrt(self.strength)
+        amplitude = self.orientation * root(self.strength)
         h_rho, h_z = loop_field(self.radius, rho, eta - self.height)
         return amplitude * h_rho, amplitude * h_z, 0.0
 
@@ -117,7 +117,7 @@ class Solenoid(Source):
         return tuple((self.radius, self.height + self.length / 2 * x) for x in points)
 
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
-        amplitude = self.orientation * math.sqrt(self.strength)
+        amplitude = self.orientation * root(self.strength)
         points, weights = np.polynomial.legendre.leggauss(self.loops)
         h_rho = h_z = 0.0
         for x, w in zip(points.tolist(), weights.tolist(), strict=True):
@@ -166,7 +166,7 @@ class Wire(Source):
         check_source(self)
 
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
-        return 0.0, 0.0, self.orientation * math.sqrt(self.strength) / rho
+        return 0.0, 0.0, self.orientation * root(self.strength) / rho
 
     def intensity(self, rho: Any, eta: Any) -> Any:
         return self.strength / rho**2
@@ -205,7 +205,7 @@ class Uniform(Source):
         check_source(self)
 
     def field(self, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
-        return 0 * rho, self.orientation * math.sqrt(self.strength) + 0 * rho, 0.0
+        return 0 * rho, self.orientation * root(self.strength) + 0 * rho, 0.0
 
 
 def loop_field(a: Any, rho: Any, z: Any) -> tuple[Any, Any]:

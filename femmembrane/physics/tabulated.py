@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ..checks import LARGEST, between, store
 from ..errors import InputError
-from .magnetics import Source, check_source
+from .magnetics import Source, check_source, root
 
 _MAX_DEGREE = 40
 
@@ -122,7 +122,7 @@ class Tabulated(Source):
         if self.rho[0] > 0:
             inside = inside * (rho >= self.rho[0])
         with np.errstate(invalid="ignore"):
-            amplitude = math.sqrt(self.strength) * np.sqrt(2.0 * inside - 1)  # NaN outside
+            amplitude = root(self.strength) * np.sqrt(2.0 * inside - 1)  # NaN outside
         rho = rho / self._size
         radial, axial = _harmonics(rho, (eta - self._middle) / self._size, self.degree)
         # the series is summed from its smallest terms on

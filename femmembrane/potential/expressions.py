@@ -110,7 +110,7 @@ def point_expressions(
             found = point_energy(magnetisation, near.sources, (R + u, Z + w), (R_x + u_x, Z_x + w_x), rates, remanence, local)
             magnetic, first, second = (area * parameters[1] * part for part in found)
         else:
-            magnetic = parameters[1] * (area * magnetic_energy_density(near.sources, scene.susceptibility or 0.0, R + u, Z + w))
+            magnetic = parameters[1] * (area * magnetic_energy_density(near.sources, scene.susceptibility, R + u, Z + w))
             second, first = ca.hessian(magnetic, local)
         magnetic, first, second = near.placed(magnetic, first, second)
         gradient, hessian = gradient + first, hessian + second

@@ -118,10 +118,10 @@ def _induced(m: Magnetisation, parts: _Parts, residual: Any, known: _Symbols) ->
     """Energy of the induced magnetisation beside a remanence along the normal, or None."""
     chi = m.susceptibility
     if m.saturation is None and not m.demagnetization:
-        return -chi / 2 * parts.intensity
+        return -0.5 * chi * parts.intensity
     if m.saturation is None:  # without a remanence there is no root for the normal part
         square = parts.normal_squared if residual is None else (parts.normal() - residual) ** 2
-        return -(chi * parts.tangential + chi / (1 + chi) * square) / 2
+        return -0.5 * (chi * parts.tangential + chi / (1 + chi) * square)
     if not m.demagnetization:
         return known.series(langevin(parts.intensity, chi, m.saturation), parts.intensity)
     normal = parts.normal() - (0.0 if residual is None else residual)

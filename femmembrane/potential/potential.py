@@ -33,6 +33,7 @@ from .expressions import BUILDING, LIFT, MOVE, casadi_answers_numpy, point_expre
 from .magnetic import wave_function
 from .nearby import Nearby
 from .replay import PointProgram, Replay, at_points
+from .template import expressions_of
 
 if TYPE_CHECKING:
     from ..physics.electric import Electric
@@ -239,7 +240,8 @@ class Potential:
                 columns |= {name: part for name, part in zip(names, space.lifting_of(lift), strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
         with casadi_answers_numpy():
-            self.symbols, self.terms = point_expressions(scene, self.sources, self.loads, tuple(columns), space, forces)
+            given = scene, self.sources, self.loads, tuple(columns), space, forces
+            self.symbols, self.terms = expressions_of(point_expressions, *given)
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
 

@@ -32,7 +32,7 @@ _FIXED: dict[type, frozenset[str]] = {
 _ELSEWHERE = frozenset(
     {
         *("mesh", "degree", "element_ends", "prestretch", "thickness", "modulus", "sources", "loads"),
-        *("title", "run", "analysis", "scales", "radius_to_thickness", "chamber"),
+        *("title", "run", "analysis", "scales", "radius_to_thickness", "chamber", "electric"),
     }
 )
 _PACKAGE = __name__.partition(".")[0] + "."
@@ -84,7 +84,7 @@ def expressions_of(
     numbers: list[Any] = []
     try:
         attributes = {f.name for f in dataclasses.fields(scene)} if dataclasses.is_dataclass(scene) else set(vars(scene))
-        members = {name: getattr(scene, name) for name in sorted(attributes - _ELSEWHERE)}
+        members = {name: getattr(scene, name) for name in sorted((attributes | {"electricity"}) - _ELSEWHERE)}
         parts = SimpleNamespace(**members), tuple(sources), tuple(loads)
         structure = tuple(_structure(part, numbers) for part in parts)
         hash(structure)

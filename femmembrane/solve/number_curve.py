@@ -248,7 +248,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return equations
 
     def place(self, point: NumberPoint) -> str:
-        return f"{point.number:.9g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+        return f"{point.number:.9g} (V = {point.state.volume:.6g}, P = {point.state.pressure + 0.0:.6g})"
 
     def settled(self, z: Array) -> Array:
         """A corrected guess, with what is known exactly put in."""

@@ -351,6 +351,8 @@ class ControlledProblem(NumberProblem):
         return super().predict(path, point, step)
 
     def forbids(self, before: NumberPoint, after: NumberPoint) -> bool:
+        if not self.family.takes(after.number):  # the corrector went beyond the last value that a scene has
+            return True
         member = self.family.member
         return member(after.number).came_through_source(after.state.x, member(before.number), before.state.x)
 

@@ -173,3 +173,11 @@ def test_a_number_fold_says_its_number() -> None:
     assert turn.number == turn.equilibrium.number(HEIGHT)
     assert f"kind='number_fold', {HEIGHT}={turn.number!r}, volume=" in repr(turn)
     assert "pressure=0.0" in repr(turn)
+
+
+def test_a_strength_that_falls_to_nothing_ends_the_trace_and_raises_nothing() -> None:
+    """The flat disc resists with w^3, so that the strength is stationary at 0 along the curve, and a corrector may step beyond."""
+    branch = fm.trace(scene(height=6.0), over=STRENGTH, hold={"pressure": 0.0}, until={"center_height": 1.0}, direction=-1)
+    assert branch.status in (Status.STEP_UNDERFLOW, Status.NO_EQUILIBRIUM)
+    assert 0 <= branch[-1].number(STRENGTH) < 1e-9
+    assert branch.special_points == ()

@@ -124,10 +124,14 @@ def _fitting(kind: str, value: float) -> tuple[str, float]:
 
 def readable(name: str, value: float, scales: Converter) -> str:
     """A value of a quantity in the SI unit that suits it, such as "6.8 MPa"."""
-    kind = quantity(name).si
+    return readable_kind(quantity(name).si, value, scales)
+
+
+def readable_kind(kind: str, value: float, scales: Converter) -> str:
+    """A value of a kind of quantity, one of :data:`SI_UNITS`, in the SI unit that suits it."""
     found = float(scales.to_si(kind, value))
-    unit, size = _fitting(kind, found)
-    return f"{found / size:.4g} {unit}"
+    unit, size = _fitting(kind, found) if kind in _READ else (SI_UNITS[kind], 1.0)
+    return f"{found / size + 0.0:.4g} {unit}"
 
 
 class Converter(Protocol):
@@ -374,7 +378,8 @@ def key_label(key: str) -> str:
 
 def written(name: str, value: Any, width: int = 0) -> str:
     """A value as tables of text have it, at the right of so many characters."""
-    return f"{value:>{width or ''}{quantity(name).form}}"
+    shown = value if isinstance(value, str) else value + 0  # 0 for -0
+    return f"{shown:>{width or ''}{quantity(name).form}}"
 
 
 def caption(volume: float, pressure: float, between: str = "  ", units: Units | None = None) -> str:
@@ -386,7 +391,7 @@ def _in_units(values: Mapping[str, float], units: Units) -> Iterator[tuple[str, 
     """Symbol, and value with its unit, of each quantity."""
     for name, value in values.items():
         unit = units.unit(name)
-        yield heading_in(name, units).partition(" in ")[0], f"{value * units.factor(name):.4g}" + (f" {unit}" if unit else "")
+        yield heading_in(name, units).partition(" in ")[0], f"{value * units.factor(name) + 0.0:.4g}" + (f" {unit}" if unit else "")
 
 
 def in_si(name: str) -> str:

@@ -58,13 +58,13 @@ class Scales:
 
     Parameters
     ----------
-    radius : float
-        R0 in m.
-    thickness : float
+    radius : float or str
+        R0 in m, or with its unit: "25 mm". So are the others.
+    thickness : float or str
         Reference thickness T in m.
-    shear_modulus : float
+    shear_modulus : float or str
         Ground-state shear modulus mu in Pa.
-    dipole_moment : float, optional
+    dipole_moment : float or str, optional
         Magnetic moment m > 0 of a dipole in A m^2; its sense is the orientation of the dipole.
 
     Raises
@@ -93,6 +93,8 @@ class Scales:
             value = getattr(self, name)
             if name == "dipole_moment" and value is None:
                 continue
+            if has_unit(value):
+                value = in_unit(f"scales.{name}", value, unit[name])[0]
             if not (is_number(value) and as_float(value) > 0):  # of any size: what follows from them is what counts
                 raise InputError(f"scales.{name}", value, f"a finite number > 0 is allowed (in {unit[name]})")
             object.__setattr__(self, name, float(value))

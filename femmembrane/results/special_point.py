@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from .equilibrium import Equilibrium
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SpecialPoint:
     """A point of a branch where something changes.
 
@@ -28,6 +28,8 @@ class SpecialPoint:
     equilibrium : Equilibrium
     azimuthal : int
         For an azimuthal onset: the number of waves against which stability is lost or regained there.
+    over : str
+        Over a number of the scene: its name, and :attr:`number` is its value.
     tangent : ndarray, shape (n_free + 1,), or None
         For a branch point of one scene: the direction in (x, P) of the branch on which it was found. It tells this branch from the
         crossing one.
@@ -40,7 +42,19 @@ class SpecialPoint:
     error: float
     equilibrium: Equilibrium = field(repr=False)
     azimuthal: int = field(default=0, kw_only=True)
+    over: str = field(default="", repr=False, kw_only=True)
     tangent: Array | None = field(default=None, repr=False, kw_only=True)
+
+    @property
+    def number(self) -> float | None:
+        """Value of the number of the scene over which the branch was traced; None for a branch of one scene."""
+        return self.equilibrium.number(self.over) if self.over else None
+
+    def __repr__(self) -> str:
+        over = {self.over: self.number} if self.over else {}
+        shown = {f.name: getattr(self, f.name) for f in fields(self) if f.repr}
+        pairs = {"kind": shown.pop("kind"), **over, **shown}
+        return f"SpecialPoint({', '.join(f'{name}={value!r}' for name, value in pairs.items())})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,7 +113,7 @@ def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: 
         rows = np.array(dataset[prefix + "tangent"].values, dtype=np.float64)
         tangents = [row if np.isfinite(row).all() else None for row in rows]
     return tuple(
-        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, tangent=t)
+        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, over=over, tangent=t)
         for k, n, e, t in zip(kinds, numbers, states, tangents, strict=True)
     )
 

@@ -269,6 +269,13 @@ class _Laboratory:
         return measured / float(getattr(self._scales(key, value), scale))
 
 
+def number_kind(key: str) -> str:
+    """Kind of a number of a scene, one of :data:`.SI_UNITS`; empty for others, and for strengths, which are of what the source is."""
+    table, _, rest = key.partition(".")
+    kind = _KINDS.get(table, {}).get(rest.rpartition(".")[2], "")
+    return kind if kind in SI_UNITS else ""
+
+
 def values_in_file(data: Mapping[str, Any], key: str, values: Sequence[Any]) -> tuple[Any, ...]:
     """Values for a key of a scene file, such as ``source.0.height``, in the units of the package; they are meant as in the file itself.
 

@@ -49,7 +49,7 @@ class Turn:
 
     def place(self, state: State) -> str:
         """Where the fold is, in words."""
-        return f"P = {state.pressure:.9g}, V = {state.volume:.9g}"
+        return f"P = {state.pressure + 0.0:.9g}, V = {state.volume:.9g}"
 
     @property
     def kind(self) -> str:

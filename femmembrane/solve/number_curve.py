@@ -248,7 +248,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return equations
 
     def place(self, point: NumberPoint) -> str:
-        return f"{point.number:.9g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+        return f"{point.number:.9g} (V = {point.state.volume:.6g}, P = {point.state.pressure + 0.0:.6g})"
 
     def settled(self, z: Array) -> Array:
         """A corrected guess, with what is known exactly put in."""
@@ -351,6 +351,8 @@ class ControlledProblem(NumberProblem):
         return super().predict(path, point, step)
 
     def forbids(self, before: NumberPoint, after: NumberPoint) -> bool:
+        if not self.family.takes(after.number):  # the corrector went beyond the last value that a scene has
+            return True
         member = self.family.member
         return member(after.number).came_through_source(after.state.x, member(before.number), before.state.x)
 

@@ -82,14 +82,16 @@ class Segment(Generic[Point]):
                 for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
                 if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
             ]
-            self._folds[quantity] = [fold for fold in found if self._turns(quantity, fold[1].point)]
+            self._folds[quantity] = [fold for fold in found if self._turns(quantity, fold[1])]
         return self._folds[quantity]
 
-    def _turns(self, quantity: Followed, fold: Point) -> bool:
-        """Whether a quantity moves at all between the ends and a fold; else the signs of its rates are round-off."""
+    def _turns(self, quantity: Followed, located: Located[Point]) -> bool:
+        """Whether a quantity moves between the ends and a fold by more than its error; else the signs of its rates are round-off."""
+        fold = located.point
         before, after = self.a.value(quantity), self.b.value(quantity)
         moved = max(abs(fold.value(quantity) - value) for value in (before, after))
-        return moved >= self.problem.resolution * max(self.problem.unit(quantity), abs(before))
+        known = max(self.problem.resolution, located.error if self.problem.resolution else 0.0)
+        return moved >= known * max(self.problem.unit(quantity), abs(before))
 
     def _brackets(self, quantity: Followed) -> list[float]:
         """0, 1, and between them the extremum of the rate where the cubic says that the rate changes sign twice."""

@@ -9,9 +9,13 @@ from ..checks import choice, is_whole, whole
 from ..discretization.space import anchored
 from ..discretization.supports import as_support, floats
 from ..errors import InputError
+from ..physics.units import has_unit, in_unit
 from ..potential import Potential
+from ..quantities import SI_UNITS, quantity
 from ..results.analyses import asked
 from ..scene import MAX_STEPS, Scene
+from ..scene.laboratory import number_kind
+from ..scene.run import GAS
 
 ILL_POSED = ("stop", "mark")
 
@@ -22,6 +26,30 @@ def check_scene(scene: Any) -> None:
         raise InputError("scene", scene, "a Scene is allowed; Scene.from_toml reads one from a file")
     asked(scene)
     _check_walls(scene)
+
+
+def kind_of(name: str) -> str:
+    """Kind of a quantity or of a number of a scene, one of :data:`.SI_UNITS`; empty for one without a value in SI units."""
+    return "energy" if name == GAS else number_kind(name) or quantity(name).si
+
+
+def plain(key: str, value: Any, scene: Any, name: str) -> Any:
+    """A text with a unit, such as "1 kPa", as a number in the units of the package, by the scales of the scene; other values as they are.
+
+    Raises
+    ------
+    InputError
+        For a unit of another kind, and for a scene without scales.
+    """
+    if not has_unit(value):
+        return value
+    check_scene(scene)
+    kind = kind_of(name)
+    if not kind:
+        raise InputError(key, value, "a number without a unit is allowed")
+    if scene.scales is None:
+        raise InputError(key, value, "a number with a unit needs a scene with scales=fm.Scales(...)")
+    return scene.scales.from_si(kind, in_unit(key, value, SI_UNITS[kind])[0])
 
 
 def _check_walls(scene: Scene) -> None:

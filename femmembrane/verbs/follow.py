@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import number, only
+from ..checks import is_number, number, only
 from ..errors import InputError, SolveError
 from ..results.branch import Branch
 from ..results.checkpoint import same_scene
@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..scene.run import GAS
 from ..solve.controls import CONTROLS, Controlled, Gas, control_kind
 from ..threads import one_thread
-from .arguments import check_scene
+from .arguments import check_scene, plain
 from .load_run import LoadRequest, checked_loads
 from .meshing import on_chosen_mesh
 from .number_run import NumberRequest
@@ -77,7 +77,7 @@ def inflate(
     V = 1.0  P = 1.0669
     V = 2.0  P = 1.8025
     """
-    request = LoadRequest(CONTROLS["volume"], checked_loads("volumes", volumes), start, solver, at_limit, throw)
+    request = LoadRequest(CONTROLS["volume"], checked_loads("volumes", volumes, scene, "volume"), start, solver, at_limit, throw)
     return _follow(scene, request, on_step=on_step)
 
 
@@ -100,7 +100,7 @@ def pressurize(
     ----------
     scene : Scene
     pressures : array_like
-        Pressures P = p R0/(mu T), signed.
+        Pressures P = p R0/(mu T), signed. With scales a text may have a unit: "1 kPa".
     start, solver, at_limit, throw, on_step
         As in :func:`inflate`.
 
@@ -123,7 +123,7 @@ def pressurize(
     P = 1.0  V = 0.9537
     P = 1.5  V = 1.3881
     """
-    request = LoadRequest(CONTROLS["pressure"], checked_loads("pressures", pressures), start, solver, at_limit, throw)
+    request = LoadRequest(CONTROLS["pressure"], checked_loads("pressures", pressures, scene, "pressure"), start, solver, at_limit, throw)
     return _follow(scene, request, on_step=on_step)
 
 
@@ -152,7 +152,7 @@ def vary(
     values : array_like
         Its values.
     hold : mapping
-        What is held: a value of one of volume, pressure and center_height.
+        What is held: a value of one of volume, pressure, center_height and, with a chamber, gas (its amount).
     start : Equilibrium, optional
         An equilibrium of the scene with any value of the number; default: as :func:`equilibrium` finds one at the first value.
     solver, at_limit, throw, on_step
@@ -190,7 +190,7 @@ def equilibrium(
     volume: float | None = None,
     pressure: float | None = None,
     center_height: float | None = None,
-    gas: Gas | None = None,
+    gas: Gas | float | None = None,
     start: Equilibrium | None = None,
     solver: str = "ipopt",
 ) -> Equilibrium:
@@ -209,8 +209,8 @@ def equilibrium(
         P = p R0/(mu T).
     center_height : float, optional
         Height over R0 of the pole, or of the first point of a meridian without a pole.
-    gas : Gas, optional
-        A fixed amount of gas behind the membrane.
+    gas : Gas or float, optional
+        A fixed amount of gas behind the membrane. A number is an amount in the chamber of the scene.
     start : Equilibrium, optional
         A neighbour to start from. Default: a cold start from the moderately inflated membrane.
     solver : {"ipopt", "newton"}
@@ -247,11 +247,16 @@ def equilibrium(
     control, load = only("equilibrium", given, "exactly one of volume, pressure, center_height and gas is allowed")
     held: Controlled
     if gas is None:
+        load = plain(control, load, scene, control)
         held, load = CONTROLS[control], number(control, load, "one finite number is allowed")
     elif isinstance(gas, Gas):
         held, load = gas, gas.amount
+    elif is_number(gas):
+        check_scene(scene)
+        held = gas_of(scene, "gas").at(number("gas", gas, "an amount > 0 is allowed", above=0.0))
+        load = held.amount
     else:
-        raise InputError("gas", gas, "a Gas is allowed, such as Gas(amount=3.0, chamber=1.0)")
+        raise InputError("gas", gas, "an amount in the chamber of the scene is allowed, or a Gas such as Gas(amount=3.0, chamber=1.0)")
     return _follow(scene, LoadRequest(held, np.array([load]), start, solver, throw=True))[0]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from ..accuracy.adapt import spread
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
+from ..quantities import readable_kind
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.path_memory import PathMemory
@@ -25,7 +26,7 @@ from ..solve.load_path import SOLVERS, LoadPath, Turn
 from ..solve.number_path import NumberPath
 from ..solve.state import State
 from ..solve.wellposed import slackness
-from .arguments import check_height
+from .arguments import check_height, kind_of, plain
 from .meshing import carried
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
@@ -90,10 +91,19 @@ class LoadRequest(Request):
         return run
 
 
-def checked_loads(key: str, values: ArrayLike) -> Array:
-    """The loads of an argument, one after the other, or InputError."""
+def checked_loads(key: str, values: ArrayLike, scene: Any = None, name: str = "") -> Array:
+    """The loads of an argument, one after the other, or InputError; texts have a unit of the quantity or number ``name`` of the scene."""
+    items: Any = values
+    if isinstance(values, str):
+        items = [values]
+    elif isinstance(values, np.ndarray) and values.dtype.kind == "U":
+        items = values.tolist()
+    if isinstance(items, (list, tuple)):
+        items = [plain(key, item, scene, name) for item in items]
+        if any(isinstance(item, str) for item in items):
+            raise InputError(key, values, "numbers are allowed")
     try:
-        loads = np.atleast_1d(np.asarray(values, dtype=float))
+        loads = np.atleast_1d(np.asarray(items, dtype=float))
     except (TypeError, ValueError, OverflowError):
         raise InputError(key, values, "numbers are allowed") from None
     if loads.ndim != 1 or not loads.size or not np.isfinite(loads).all():
@@ -187,7 +197,18 @@ class LoadRun(Run[Branch]):
         return self.request.held.words
 
     def _not_reached(self, index: int, why: str) -> str:
-        return f"{self.words} {self.request.loads[index]:.9g} was not reached: {why}"
+        load = float(self.request.loads[index])
+        return f"{self.words} {load + 0.0:.9g}{self._in_si(load)} was not reached: {why}"
+
+    def _in_si(self, load: float) -> str:
+        """A load in SI units, in brackets; empty where the scene has no scales."""
+        scales, kind = self.scene.scales, self.kind
+        return f" ({readable_kind(kind, load, scales)})" if kind and scales is not None else ""
+
+    @property
+    def kind(self) -> str:
+        """Kind of the loads, of those that have SI units."""
+        return kind_of(self.request.held.name)
 
     def _limit(self, turn: Turn) -> SpecialPoint | None:
         if turn.fold is None:

@@ -17,6 +17,7 @@ from ..scene import Scene
 from ..solve.controls import Controlled, Gas, GasOver
 from ..solve.number_path import NumberPath
 from ..solve.state import State
+from .arguments import kind_of
 from .load_run import LoadRequest, LoadRun, checked_loads
 from .over_number import AT_REST, Hold, OverNumber, checked_number, family_of
 from .running import End
@@ -56,7 +57,7 @@ class NumberRequest(LoadRequest):
         """The request that the arguments of :func:`femmembrane.vary` make, or InputError."""
         parameter = checked_number(key, scene, over)
         held = Hold.checked(hold, parameter.name)
-        loads = checked_loads(values_key, values)
+        loads = checked_loads(values_key, values, scene, parameter.name)
         for value in loads.tolist():
             parameter.scene_at(value)
         return cls(held.controlled(scene), loads, start, solver, at_limit, throw, over=parameter.name, hold=held)
@@ -102,6 +103,10 @@ class NumberRun(OverNumber, LoadRun):
         if isinstance(control, GasOver):
             return Gas(control.amount, control.chamber, control.atmosphere)
         return control if isinstance(control, Gas) else None
+
+    @property
+    def kind(self) -> str:
+        return kind_of(self.request.over)
 
     @property
     def words(self) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
+import numpy as np
+
 from ..checks import choice, number, sign
 from ..errors import InputError, Status
 from ..potential import potential_of
@@ -28,6 +30,10 @@ from .over_number import AT_REST, Hold, OverNumber, checked_number, family_of
 from .running import End
 from .state_records import OnStep, restore
 from .trace_run import Start, TraceRequest, TraceRun, first_state
+
+#: movement per change of the number by its scale, in units of the membrane, below which the number has lost its influence; the stiffness of
+#: a flat membrane vanishes with its displacements, and not far beyond their rates are round-off
+_IDLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +154,9 @@ class NumberTraceRun(OverNumber, TraceRun):
         z, tangent = memory.points[-1], memory.slopes[-1]
         state = restore(self.family, last, float(z[-1]))
         borders = Borders(memory.border, memory.border, 0.0)
-        return NumberPoint(state, z, tangent, self.problem.dual(tangent), memory.sigma[-1], borders)
+        point = NumberPoint(state, z, tangent, self.problem.dual(tangent), memory.sigma[-1], borders)
+        self._moved = self._movement(point)
+        return point
 
     def same(self, scene: Scene) -> Scene:
         return scene.replace(analysis=self.scene.analysis, run=self.scene.run, title=self.scene.title)
@@ -161,15 +169,44 @@ class NumberTraceRun(OverNumber, TraceRun):
         return NUMBER if name == self.request.over else name
 
     def place(self, point: BranchPoint) -> str:
-        return f"{self.request.over} = {point.state.evaluation.factor:.6g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+        state = point.state
+        return f"{self.request.over} = {state.evaluation.factor:.6g} (V = {state.volume:.6g}, P = {state.pressure + 0.0:.6g})"
 
     def origin(self, point: BranchPoint) -> str:
         return f"{self.request.over} = {self.parameter.value:.6g}"
 
     def at_bound(self, point: BranchPoint) -> End | None:
         if point.z[-1] not in self.problem.bounds:
-            return None
+            return self._idle(point)
         return Status.NO_EQUILIBRIUM, f"{self.request.over} = {point.z[-1]:.9g} is the last value that this scene can take"
+
+    def _idle(self, point: BranchPoint) -> End | None:
+        """The end where two steps one after the other have hardly moved the membrane, and none that are left lead to what is asked for."""
+        before, self._moved = self._moved, self._movement(point)
+        if NUMBER in map(self.quantity, self.request.targets) or not self._moved < before < _IDLE or self._ahead(point):
+            return None
+        back = -1 if point.tangent[-1] > 0 else 1
+        message = f"at {self.place(point)} the number has no influence any more: the membrane comes to rest; try direction={back}"
+        return Status.NO_EQUILIBRIUM, message
+
+    def _ahead(self, point: BranchPoint) -> bool:
+        """Whether a target is met by the steps that are left if the membrane goes on as it does."""
+        way = (self.request.max_steps - self.made) * self.tracer.step
+        for name, target in self.request.targets.items():
+            quantity = self.quantity(name)
+            rate = point.rate(quantity)
+            if 0 < (target - point.value(quantity)) * rate < rate * rate * way:
+                return True
+        return False
+
+    def _movement(self, point: BranchPoint) -> float:
+        """How far the membrane and its pressure move with arc length."""
+        moved = point.tangent.copy()
+        moved[-1] = 0.0
+        return self.problem.norm(moved)
+
+    #: the movement at the last point
+    _moved: float = np.inf
 
     # --- what it looks for on the way
 
@@ -182,7 +219,7 @@ class NumberTraceRun(OverNumber, TraceRun):
         return segment.b if last is None and self._first is not None and segment.passes(self._first) else None
 
     def set_out(self, point: BranchPoint, clock: float) -> None:
-        self._first = point
+        self._first, self._moved = point, self._movement(point)
         super().set_out(point, clock)
 
     _first: BranchPoint | None = None

@@ -122,6 +122,11 @@ class OverNumber:
     family: Family
     parameter: Parameter
 
+    @property
+    def over(self) -> str:
+        """Name of the number."""
+        return self.parameter.name
+
     def own(self, state: State) -> State:
         member = self.family.member(state.evaluation.factor)
         return replace(state, evaluation=member.evaluate(state.x, state.pressure))

@@ -84,6 +84,11 @@ class Run(ABC, Generic[R]):
         self.timings = dict.fromkeys(stages, 0.0)
         self.shortfall: Shortfall | None = None
 
+    @property
+    def over(self) -> str:
+        """Name of the number of the scene that changes; empty where none does."""
+        return ""
+
     def own(self, state: State) -> State:
         """A state of the solver as one of its own scene."""
         return state

@@ -93,9 +93,9 @@ def record(
     coefficients = state.x.copy()
     coefficients.flags.writeable = False
     equilibrium = Equilibrium(
-        pressure=float(state.pressure),
-        volume=state.evaluation.volume,
-        center_height=potential.space.center_height(state.x),
+        pressure=float(state.pressure) + 0.0,  # 0, not -0
+        volume=state.evaluation.volume + 0.0,
+        center_height=potential.space.center_height(state.x) + 0.0,
         elastic_energy=state.evaluation.elastic_energy,
         magnetic_energy=state.evaluation.magnetic_energy,
         residual=float(state.residual),
@@ -120,4 +120,5 @@ def special_point(run: Run[Branch], scene: Scene, located: Located[BranchPoint],
     eq = record(scene, state.evaluation.potential, state)
     # over a number the direction is none of the branch of one scene
     tangent = point.tangent.copy() if located.kind == "branch_point" and len(point.tangent) == len(state.x) + 1 else None
-    return SpecialPoint(located.kind, eq.volume, eq.pressure, eq.center_height, located.error, eq, azimuthal=azimuthal, tangent=tangent)
+    place = (eq.volume, eq.pressure, eq.center_height)
+    return SpecialPoint(located.kind, *place, located.error, eq, azimuthal=azimuthal, over=run.over, tangent=tangent)

@@ -58,8 +58,8 @@ def trace(
         A number of the scene that changes along the branch in place of the load, such as ``source.0.height``: see
         :mod:`femmembrane.scene.variation`. It sets out from its value in ``scene``, and every equilibrium has its own scene.
     hold : mapping, optional
-        What is held meanwhile: a value of one of volume, pressure, center_height and gas. The membrane is first brought there from
-        ``start``; without a start, as :func:`equilibrium` finds it.
+        What is held meanwhile: a value of one of volume, pressure, center_height and, with a chamber, gas (its amount). The membrane
+        is first brought there from ``start``; without a start, as :func:`equilibrium` finds it.
     direction : {1, -1}, optional
         1 (default) sets out towards larger volume. Over a number it sets out towards larger numbers; the default is then the way to the
         number in ``until``. From a branch point it names a half of the crossing branch: on half 1 the volume grows. Where the

@@ -340,7 +340,7 @@ class TraceRun(Run[Branch]):
     def place(self, point: BranchPoint) -> str:
         """Where a point is, for messages."""
         height = self.potential.space.center_height(point.state.x)
-        return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure:.6g})"
+        return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure + 0.0:.6g})"
 
     def _add(self, point: BranchPoint, clock: float) -> None:
         with self.timed("verdicts"):

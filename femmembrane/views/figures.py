@@ -7,7 +7,8 @@ the figures read the same in grey.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,9 +49,10 @@ ILL_POSED = Style("ill-posed (compressed or slack)", DOTTED, "#888888", 1.2)
 #: when one control alone was asked for
 STABLE_UNDER = {c: Style(f"stable under {c} control", SOLID, BLUE) for c in ("pressure", "volume", "gas")}
 UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) for c in ("pressure", "volume", "gas")}
+#: when three were asked for
+_ALL, _NONE = replace(BOTH, label="stable under all three controls"), replace(UNSTABLE, label="unstable under all three controls")
+_TWO_OF_THREE = (0, (5, 2, 1, 2, 1, 2))
 
-#: the order of the lines in a legend
-_ORDER = [s.label for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED)]
 #: in place of a verdict
 ILL_POSED_WORD = "ill-posed"
 
@@ -68,11 +70,41 @@ def style_of(words: Mapping[str, str]) -> Style:
         return ILL_POSED
     if "marginal" in words.values():
         return MARGINAL
-    if not {"pressure", "volume"} <= words.keys():  # of one control alone; beside another one of the gas
-        control = "gas" if "gas" in words else next(iter(words))
-        word = words[control]
-        return (STABLE_UNDER if word == "stable" else UNSTABLE_UNDER)[control]
-    return UNSTABLE if words["volume"] == "unstable" else BOTH if words["pressure"] == "stable" else VOLUME_ONLY
+    stable = tuple(control for control in STABLE_UNDER if words.get(control) == "stable")
+    if len(words) == 1:
+        (control,) = words
+        return (STABLE_UNDER if stable else UNSTABLE_UNDER)[control]
+    if len(words) == len(STABLE_UNDER):
+        return _NONE if not stable else _ALL if len(stable) == len(words) else _stable_under_some(stable)
+    if 0 < len(stable) < len(words):
+        return _stable_under_some(stable)
+    if words.keys() == {"pressure", "volume"}:
+        return BOTH if stable else UNSTABLE
+    both = tuple(control for control in STABLE_UNDER if control in words)
+    return _under_pair(BOTH, both) if stable else _under_pair(UNSTABLE, both)
+
+
+def _under_pair(style: Style, controls: Sequence[str]) -> Style:
+    """The style of one word under two controls, of which one is the gas."""
+    return replace(style, label=f"{style.label.split()[0]} under {' and '.join(controls)} control")
+
+
+def _stable_under_some(controls: Sequence[str]) -> Style:
+    """The style of equilibria that are stable under these controls, and not under others that were asked for."""
+    label = f"stable under {' and '.join(controls)} control only"
+    return replace(VOLUME_ONLY, label=label, dashes=DASHED if len(controls) == 1 else _TWO_OF_THREE)
+
+
+_PAIRS = tuple(combinations(STABLE_UNDER, 2))
+#: the order of the lines in a legend
+_ORDER = [
+    style.label
+    for style in (
+        *(BOTH, _ALL, *(_under_pair(BOTH, pair) for pair in _PAIRS), *STABLE_UNDER.values()),
+        *(_stable_under_some(some) for some in (*_PAIRS, *combinations(STABLE_UNDER, 1))),
+        *(*UNSTABLE_UNDER.values(), *(_under_pair(UNSTABLE, pair) for pair in _PAIRS), UNSTABLE, _NONE, MARGINAL, ILL_POSED),
+    )
+]
 
 
 def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[float] = (1.0,)) -> tuple[Figure, Any]:

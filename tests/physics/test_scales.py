@@ -16,7 +16,7 @@ from femmembrane import cli
 from femmembrane.errors import InputError
 from femmembrane.physics.scales import SQUARED
 from femmembrane.potential import potential_of
-from femmembrane.quantities import SI_UNITS
+from femmembrane.quantities import SI_UNITS, caption, written
 from femmembrane.results import table
 from femmembrane.scene.variation import Parameter
 from femmembrane.views import picture
@@ -525,3 +525,33 @@ def test_run_of_a_scene_file(tmp_path):
     expected = fm.inflate(MAGNETIC, volumes=[1.0, 2.0]).column("pressure")
     np.testing.assert_allclose([float(row["pressure"]) for row in found], expected, rtol=1e-12)
     np.testing.assert_allclose([float(row["pressure_pa"]) for row in found], 400.0 * expected, rtol=1e-12)
+
+
+def test_scales_and_loads_are_texts_with_units() -> None:
+    """mu T/R0 = 400 Pa and R0^3 = 125 ml."""
+    texts = fm.Scales(radius="5 cm", thickness="50 um", shear_modulus="0.4 MPa", dipole_moment="12 A m^2")
+    assert texts == MAGNET
+    with pytest.raises(InputError, match=r"scales\.radius.*a length such as"):
+        fm.Scales(radius="5 kPa", thickness=5e-5, shear_modulus=4e5)
+    bare = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), scales=RUBBER)
+    pressures = fm.pressurize(bare, pressures=["0.2 kPa", 1.0]).column("pressure")
+    np.testing.assert_allclose(pressures, [0.5, 1.0], rtol=1e-12)
+    assert fm.inflate(bare, volumes="125 ml")[0].volume == pytest.approx(1.0, rel=1e-12)
+    assert fm.equilibrium(bare, pressure="0.2 kPa").pressure == pytest.approx(0.5, rel=1e-12)
+    for scene, text in ((bare, "1 mm"), (bare.replace(scales=None), "1 kPa"), (bare, "1")):
+        with pytest.raises(InputError, match="pressures"):
+            fm.pressurize(scene, pressures=[text])
+
+
+def test_a_load_that_is_not_reached_is_also_given_in_si_units() -> None:
+    bare = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), scales=RUBBER)
+    with pytest.raises(fm.SolveError, match=r"^pressure 3 \(1\.2 kPa\) was not reached: "):
+        fm.pressurize(bare, pressures=[1.0, 3.0])
+
+
+def test_zero_is_printed_without_a_sign() -> None:
+    assert written("pressure", -0.0, 4) == "   0"
+    assert written("step", 3) == "3"
+    assert caption(-0.0, -0.0) == "V = 0  P = 0"
+    flat = fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), prestretch=1.5), pressure=-0.0)
+    assert "-0" not in repr((flat.pressure, flat.volume, flat.center_height)).replace("e-0", "")

@@ -36,7 +36,7 @@ def test_amounts_of_gas_are_loads(tmp_path: Path) -> None:
     assert again.scene == asked
     assert "under gas" in str(branch)
     (axes,) = branch.plot().axes
-    assert "stable under gas control" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "stable under pressure and gas control" in [text.get_text() for text in axes.get_legend().get_texts()]
 
 
 @pytest.mark.parametrize("number", ["chamber.volume", "chamber.atmosphere"])
@@ -120,3 +120,11 @@ def test_the_error_of_a_run_of_gas_is_studied_at_its_last_amount(run: fm.Run) ->
     study = convergence_of_run(scene(run=run), degrees=(1, 2), elements=(4, 8))
     assert (study.control, study.load) == ("gas", 3.0)
     assert study.errors["volume"][1, 1] < 1e-4 < study.errors["volume"][0, 0]
+
+
+def test_a_number_is_an_amount_in_the_chamber_of_the_scene() -> None:
+    assert fm.equilibrium(scene(), gas=8.0).volume == fm.equilibrium(scene(), gas=fm.Gas(8.0, 1.0, 0.5)).volume
+    with pytest.raises(fm.InputError, match=r"^gas"):
+        fm.equilibrium(scene(), gas=-1.0)
+    with pytest.raises(fm.InputError, match="the scene has no chamber of gas"):
+        fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8)), gas=8.0)

@@ -143,3 +143,41 @@ def test_what_is_refused(arguments: dict[str, object], message: str) -> None:
 def test_a_number_without_influence_is_refused() -> None:
     with pytest.raises(InputError, match="changes no force"):
         fm.trace(scene(susceptibility=0.0), over=STRENGTH, hold={"volume": 0.5})
+
+
+def test_a_trace_ends_where_the_number_has_lost_its_influence() -> None:
+    """A magnet that goes away leaves a flat disc, which has no stiffness: the force falls with a power of the distance, and so does V."""
+    branch = fm.trace(scene(height=6.0), over=HEIGHT, hold={"pressure": 0.0}, until={"center_height": 1.5})
+    assert branch.status is Status.NO_EQUILIBRIUM
+    assert "the number has no influence any more: the membrane comes to rest; try direction=-1" in branch.message
+    assert len(branch) < 100
+    assert branch.special_points == ()
+    heights, volumes = branch.column(HEIGHT)[-2:], branch.column("volume")[-2:]
+    # a flat disc resists with w^3, and a far dipole pulls with d|H|^2/dh ~ h^-7: V ~ h^(-7/3)
+    assert np.diff(np.log(volumes))[0] / np.diff(np.log(heights))[0] == pytest.approx(-7 / 3, abs=0.02)
+    back = fm.trace(scene(height=6.0), over=HEIGHT, hold={"pressure": 0.0}, until={"center_height": 0.5}, direction=-1)
+    assert back.status is Status.CONVERGED
+
+
+def test_values_of_the_number_and_of_the_height_on_the_way_to_rest_are_met() -> None:
+    far = fm.trace(scene(height=6.0), over=HEIGHT, hold={"pressure": 0.0}, until={HEIGHT: 1200.0})
+    low = fm.trace(scene(height=6.0), over=HEIGHT, hold={"pressure": 0.0}, until={"center_height": 1.5e-5})
+    for branch in (far, low):
+        assert branch.status is Status.CONVERGED
+        assert branch.special_points == ()
+    assert low[-1].center_height == pytest.approx(1.5e-5, rel=1e-9)
+
+
+def test_a_number_fold_says_its_number() -> None:
+    (turn,) = [p for p in approach().special_points or () if p.kind == "number_fold"]
+    assert turn.number == turn.equilibrium.number(HEIGHT)
+    assert f"kind='number_fold', {HEIGHT}={turn.number!r}, volume=" in repr(turn)
+    assert "pressure=0.0" in repr(turn)
+
+
+def test_a_strength_that_falls_to_nothing_ends_the_trace_and_raises_nothing() -> None:
+    """The flat disc resists with w^3, so that the strength is stationary at 0 along the curve, and a corrector may step beyond."""
+    branch = fm.trace(scene(height=6.0), over=STRENGTH, hold={"pressure": 0.0}, until={"center_height": 1.0}, direction=-1)
+    assert branch.status in (Status.STEP_UNDERFLOW, Status.NO_EQUILIBRIUM)
+    assert 0 <= branch[-1].number(STRENGTH) < 1e-9
+    assert branch.special_points == ()

@@ -19,7 +19,7 @@ from femmembrane.results.special_point import Jump, SpecialPoint
 from femmembrane.results.verdict import Verdict
 from femmembrane.scene import Analysis, Scene
 from femmembrane.verbs import inflate
-from femmembrane.views import picture, plots, vtk, zones
+from femmembrane.views import figures, picture, plots, vtk, zones
 
 pyvista = pytest.importorskip("pyvista")
 
@@ -476,3 +476,20 @@ def test_no_global_state(branch: Branch) -> None:
     assert shown.stdout.strip() == "[]"
     plots.plot_pressure_volume(branch)
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+@pytest.mark.parametrize(
+    ("words", "label"),
+    [
+        ({"pressure": "stable", "volume": "stable", "gas": "stable"}, "stable under all three controls"),
+        ({"pressure": "unstable", "volume": "stable", "gas": "stable"}, "stable under volume and gas control only"),
+        ({"pressure": "unstable", "volume": "stable", "gas": "unstable"}, "stable under volume control only"),
+        ({"pressure": "unstable", "volume": "unstable", "gas": "unstable"}, "unstable under all three controls"),
+        ({"pressure": "unstable", "volume": "stable"}, "stable under volume control only"),
+        ({"pressure": "unstable", "gas": "stable"}, "stable under gas control only"),
+        ({"pressure": "stable", "gas": "stable"}, "stable under pressure and gas control"),
+        ({"gas": "stable"}, "stable under gas control"),
+    ],
+)
+def test_the_label_names_every_control_under_which_a_state_is_stable(words: dict[str, str], label: str) -> None:
+    assert figures.style_of(words).label == label

@@ -12,7 +12,7 @@ and 1e-10 with degree 2: 32, 110, 326, 988; degree 4: 20, 32, 56, 104; degree 6:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import TYPE_CHECKING, Any, cast
@@ -30,7 +30,7 @@ from ..solve.controls import CONTROLS
 from ..solve.finer_space import met_across, solved_in, transferred
 from ..solve.state import State
 from ..solve.state_resolution import largest_kink
-from ..solve.wellposed import ill_posed
+from ..solve.wellposed import ill_posed, stress_scale
 from .error_estimate import finer_space, same_state
 
 if TYPE_CHECKING:
@@ -153,8 +153,7 @@ def _way(branch: Branch, kept: int) -> float:
 
 def _checked(branch: Branch) -> list[int]:
     """Equilibria of a run whose errors say most: some all along, the extreme ones, and the ones with the largest kinks."""
-    potential = branch[0].potential
-    kinks = [largest_kink(potential, eq.state) for eq in branch]
+    kinks = [largest_kink(eq.potential, eq.state) for eq in branch]
     return sorted({*spread([eq.volume for eq in branch]), *np.argsort(kinks)[-_TRIED:].tolist()})
 
 
@@ -162,15 +161,14 @@ def _shortfall(branch: Branch, controls: tuple[str, ...], accuracy: float) -> Sh
     """Where the accuracy ends; None when it is kept at all equilibria that were looked at."""
     if not len(branch):
         return None
-    potential = branch[0].potential
-    scale = _LEAST_PRESSURE * max(abs(eq.pressure) for eq in branch)
+    scale = _least_pressure(branch)
 
     def error(k: int) -> float:
         eq = branch[k]
         if eq.status.ill_posed:
             return 0.0
-        found = relative_error(potential, eq.state, eq.pressure, controls, scale)
-        return _across(potential, eq, scale) if np.isnan(found) and len(controls) > 1 else found
+        found = relative_error(eq.potential, eq.state, eq.pressure, controls, scale)
+        return _across(eq.potential, eq, scale) if np.isnan(found) and len(controls) > 1 else found
 
     good = -1
     for k in _checked(branch):
@@ -259,8 +257,8 @@ class _Choice:
 class _Trial:
     """A few states of a run on a trial mesh, with their relative errors."""
 
-    potential: Potential
-    states: Sequence[tuple[Array, float]]
+    space: Space
+    states: Sequence[Equilibrium]
     controls: tuple[str, ...]
     errors: Array
     elements: int
@@ -274,12 +272,12 @@ class _Trial:
 
     def density(self) -> tuple[Array, Array]:
         """Points s and the density of elements there that suits all states."""
-        space = self.potential.space
+        space = self.space
         centres, s = (space.ends[1:] + space.ends[:-1]) / 2, np.linspace(0.0, 1.0, 40 * self.elements + 1)
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
-        for (x, _), weight in zip(self.states, weights, strict=True):
-            density = np.maximum(_misses(space, x) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+        for eq, weight in zip(self.states, weights, strict=True):
+            density = np.maximum(_misses(space, eq.state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
             smooth = np.exp(np.interp(s, centres, np.log(density)))
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
@@ -290,14 +288,14 @@ class _Trial:
 
     def error_on(self, scene: Scene, which: Any) -> float:
         """Largest estimated error of the states on another mesh; infinite when one of them is not found there."""
-        potential = potential_of(scene)
-        return max(self._moved(potential, *self.states[k]) for k in which)
+        return max(self._moved(scene, self.states[k]) for k in which)
 
-    def _moved(self, potential: Potential, x: Array, pressure: float) -> float:
-        volume = self.potential.evaluate(x, pressure).volume
+    def _moved(self, scene: Scene, eq: Equilibrium) -> float:
+        # a run over a number of the scene has a scene for every state
+        potential = potential_of(eq.scene.replace(mesh=scene.mesh, degree=scene.degree))
         for kind in (CONTROLS[name] for name in reversed(self.controls)):
-            held = kind.at(kind.value(self.potential.space, x, pressure, volume))
-            result = solved_in(potential, held, self.potential, x, pressure, damped=True)
+            held = kind.at(kind.value(eq.potential.space, eq.state, eq.pressure, eq.volume))
+            result = solved_in(potential, held, eq.potential, eq.state, eq.pressure, damped=True)
             if result.status is Status.CONVERGED:
                 error = relative_error(potential, result.x, result.pressure, self.controls, self.scale)
                 return error if np.isfinite(error) else np.inf
@@ -318,7 +316,7 @@ def relative_error(potential: Potential, x: Array, pressure: float, controls: Se
         if better is not None:
             sizes = max(abs(pressure), scale), abs(evaluation.elastic_energy) + abs(evaluation.magnetic_energy)
             changes = abs(pressure - better.pressure), abs(evaluation.energy - better.evaluation.energy)
-            errors.append(max(c / size if c else 0.0 for c, size in zip(changes, sizes, strict=True)))
+            errors.append(max(c / size if size else 0.0 for c, size in zip(changes, sizes, strict=True)))
     return min(errors, default=np.nan)
 
 
@@ -352,13 +350,21 @@ def _on(scene: Scene, mesh: Disc) -> Scene:
 
 
 def _estimated(equilibria: Sequence[Equilibrium], controls: tuple[str, ...], elements: int) -> _Trial:
-    potential = equilibria[0].potential
-    scale = _LEAST_PRESSURE * max(abs(eq.pressure) for eq in equilibria)
-    errors = np.array([relative_error(potential, eq.state, eq.pressure, controls, scale) for eq in equilibria])
+    scale = _least_pressure(equilibria)
+    errors = np.array([relative_error(eq.potential, eq.state, eq.pressure, controls, scale) for eq in equilibria])
     known = np.isfinite(errors)
-    states = [(eq.state, eq.pressure) for eq, k in zip(equilibria, known, strict=True) if k]
-    wrinkled = potential.scene.tension_field and any((potential.evaluate(*state).stress <= 0).any() for state in states)
-    return _Trial(potential, states, controls, errors[known], elements, wrinkled, scale)
+    states = [eq for eq, k in zip(equilibria, known, strict=True) if k]
+    wrinkled = any(eq.scene.tension_field and (eq.potential.evaluate(eq.state, eq.pressure).stress <= 0).any() for eq in states)
+    return _Trial(equilibria[0].potential.space, states, controls, errors[known], elements, wrinkled, scale)
+
+
+def _least_pressure(equilibria: Iterable[Equilibrium]) -> float:
+    """The pressure below which errors are relative to this one. Where a run holds little pressure against other loads, the stress that
+    they make stands in place of its largest one.
+    """
+    largest = max(abs(eq.pressure) for eq in equilibria)
+    stress = max(stress_scale(eq.potential.evaluate(eq.state, eq.pressure)) for eq in equilibria)
+    return _LEAST_PRESSURE * max(largest, _LEAST_PRESSURE * stress)
 
 
 def _accuracy(scene: Scene) -> float:

@@ -116,8 +116,10 @@ class Segment(Generic[Point]):
             return low, Located(kind, self.at(low), (high - low) * self.length + self.spread(low, high))
         point = self.at(share)
         h = 1e-3 * (high - low)
-        near = self.at(share + h if share + h < high else share - h)
-        slope = (function(near) - function(point)) / (near.sigma - point.sigma)
+        near = share + h if share + h < high else share - h
+        # from shares, since arc lengths of a long curve are too coarse to differ on a short segment
+        run = (near - share) * self.length
+        slope = (function(self.at(near)) - function(point)) / run if run else 0.0
         offset = (abs(function(point) / slope) if slope else self.length) + point.state.correction
         moved = max(abs(point.rate(q)) * offset / (unit + abs(point.value(q))) for q, unit in self.problem.units.items())
         return share, Located(kind, point, float(moved + point.state.correction))
@@ -158,7 +160,7 @@ class Segment(Generic[Point]):
     def _crossing(self, quantity: Followed, value: float, low: float, high: float) -> Point:
         if value == 0 and (rest := self.problem.rest_between(self.a, self.b)) is not None:
             a, b = self.a.value(quantity), self.b.value(quantity)
-            rest.sigma = self.a.sigma + self.length * a / (a - b)
+            rest.sigma = self.a.sigma + self.length * (a / (a - b) if a != b else high)
             return rest
         share = brentq(lambda s: self.at(s).value(quantity) - value, low, high, xtol=1e-14, rtol=8.9e-16, disp=False)
         point = self.at(share)

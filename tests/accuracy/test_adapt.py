@@ -454,3 +454,39 @@ def test_off_means_off(monkeypatch):
 def test_elements_that_are_not_chosen_are_not_halved():
     with pytest.raises(fm.InputError, match=r"mesh\.accuracy = 0\.0001: its elements are still to be chosen"):
         fm.disc(accuracy=1e-4).refined()
+
+
+DIPOLE = {"sources": [fm.Dipole(20, 4)], "susceptibility": 1.0}
+
+
+@pytest.mark.parametrize("pressure", [0.0, 1e-9])
+def test_without_pressure_its_errors_are_relative_to_the_stress(pressure):
+    eq = fm.equilibrium(fm.Scene(fm.NeoHookean(), mesh=fm.disc(accuracy=1e-6), **DIPOLE), pressure=pressure)
+    # 60 elements of degree 6 have the volume 0.165599112944; volume and P differ by a compliance of order one
+    assert eq.volume == pytest.approx(0.165599112944, rel=1e-6)
+    assert 0 < eq.scene.mesh.estimated < 1e-6
+
+
+def test_a_run_without_pressure_over_a_height():
+    scene = fm.Scene(fm.NeoHookean(), mesh=fm.disc(accuracy=1e-6), **DIPOLE)
+    last = fm.vary(scene, "source.0.height", [4.0, 3.5], hold={"pressure": 0.0})[-1]
+    fine = last.scene.replace(mesh=fm.disc(30), degree=6)
+    assert last.volume == pytest.approx(fm.equilibrium(fine, pressure=0.0).volume, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("scene", "over", "values"),
+    [
+        (fm.Scene(fm.NeoHookean(), mesh=fm.disc(accuracy=1e-6), prestretch=1.2), "membrane.prestretch", [1.2, 1.5]),
+        (fm.Scene(fm.NeoHookean(), mesh=fm.disc(accuracy=1e-6), **DIPOLE), "source.0.height", [4.0, 3.5]),
+        (fm.Scene(fm.Gent(jm=30.0), mesh=fm.disc(accuracy=1e-6)), "material.jm", [30.0, 20.0]),
+    ],
+    ids=["prestretch", "height", "jm"],
+)
+def test_the_errors_of_a_run_over_a_number_are_those_of_its_own_scenes(scene, over, values):
+    branch = fm.vary(scene, over, values, hold={"pressure": 0.3})
+    for eq in branch:
+        fine = eq.scene.replace(mesh=fm.disc(30), degree=6)
+        assert eq.volume == pytest.approx(fm.equilibrium(fine, pressure=0.3).volume, rel=2e-6)
+    traced = fm.trace(scene, over=over, until={over: values[-1]}, hold={"pressure": 0.3})
+    assert traced[-1].volume == pytest.approx(branch[-1].volume, rel=2e-6)

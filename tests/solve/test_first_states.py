@@ -350,6 +350,13 @@ def test_what_its_pressure_pushes_out_of_a_pipe_is_refused(mesh: Any) -> None:
         fm.trace(scene, start=8.0)
 
 
+def test_what_a_weak_dipole_cannot_hold_in_a_pipe_is_not_reached() -> None:
+    """The dipole is too weak for P = 0.6. Far out, arc lengths of 1e6 differ by less than their round-off between points of a step."""
+    scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cap(0.5, 16, rim="axial"), degree=3, sources=[fm.Dipole(20, 5)], susceptibility=1.0)
+    with pytest.raises(fm.SolveError, match=r"no equilibrium was found at P = 0\.6 that is stable"):
+        fm.equilibrium(scene, pressure=0.6)
+
+
 def test_two_pipes_of_one_radius_push_it_nowhere() -> None:
     """An open tube between two pipes keeps its length where it is not stretched along it: the forces of both lids cancel."""
     scene = fm.Scene(material=NEO_HOOKEAN, mesh=fm.cylinder(2.0, 12, top="axial", bottom="axial"))

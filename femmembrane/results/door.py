@@ -90,6 +90,13 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     return plot_pressure_volume(branch, path)
 
 
+def plot_branch(branch: Branch, path: str | PathLike[str] | None, ax: Any, x: str, y: str, label: str | None) -> Any:
+    """See :func:`femmembrane.views.plots.plot_branch`."""
+    from ..views.plots import plot_branch
+
+    return plot_branch(branch, path, ax=ax, x=x, y=y, label=label)
+
+
 def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
     """See :func:`femmembrane.views.plots.plot_zones`."""
     from ..views.plots import plot_zones

@@ -149,7 +149,8 @@ class LoadRun(Run[Branch]):
             gas = self.request.held.at(self.path.load) if isinstance(self.request.held, Gas) else None
             new = record(self.scene, self.potential, state, self.found[-1] if self.found else None, clock, gas)
         if turn is not None:
-            self.jumps.append(Jump(index, self._limit(turn), new))
+            held = self.request.held.name
+            self.jumps.append(Jump(index, self._limit(turn), new, held if held in CONTROLS else ""))
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(index, len(loads), new)

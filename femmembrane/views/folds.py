@@ -9,8 +9,8 @@ import numpy as np
 
 from ..quantities import axis_label, key_label
 from ..results.folds import FOLD_NAMES, FoldCurve
-from .backend import load, title_text
-from .figures import save_figure
+from .backend import title_text
+from .figures import save_figure, shown_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,12 +27,7 @@ def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -
     InputError
         For a file that cannot be written.
     """
-    load()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = shown_figure((6.4, 6.0))
     panels = figure.subplots(2, 1, sharex=True)
     title = curve.equilibria[0].scene.title if curve.equilibria else ""
     heading = title_text(title) or FOLD_NAMES[curve.kind][0].upper() + FOLD_NAMES[curve.kind][1:]

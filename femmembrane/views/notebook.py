@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import base64
-import io
 from html import escape
 from typing import TYPE_CHECKING
 
 from . import plots
-from .backend import drawing
+from .figures import png
 from .html import branch_rows, equilibrium_pairs, table
 
 if TYPE_CHECKING:
@@ -45,8 +44,5 @@ def equilibrium_html(equilibrium: Equilibrium) -> str:
 
 def _picture(figure: Figure, label: str) -> str:
     """A PNG in the page: notebooks put many pages into one, where the ids of SVGs would meet."""
-    file = io.BytesIO()
-    with drawing():
-        figure.savefig(file, format="png", dpi=110)
-    data = base64.b64encode(file.getvalue()).decode()
+    data = base64.b64encode(png(figure)).decode()
     return f'<img alt="{escape(label)}" style="max-width:min(100%, 560px)" src="data:image/png;base64,{data}"/>'

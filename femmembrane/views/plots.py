@@ -26,6 +26,7 @@ from .figures import (
     legend_entries,
     new_figure,
     save_figure,
+    show_in_notebooks,
     verdict_style,
 )
 from .meridians import draw_profile, draw_surroundings
@@ -52,6 +53,7 @@ __all__ = [
     "draw_zones",
     "legend_entries",
     "new_figure",
+    "plot_branch",
     "plot_pressure_volume",
     "plot_profiles",
     "plot_zones",
@@ -78,8 +80,41 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.6), title=branch.scene.title)
     draw_branch(axes, branch)
-    draw_legend(axes, "among axisymmetric shapes:" if branch.scene.analysis.stability else None)
+    draw_legend(axes, _heading(branch))
     return save_figure(figure, path)
+
+
+def plot_branch(
+    branch: Branch,
+    path: str | PathLike[str] | None = None,
+    *,
+    ax: Axes | None = None,
+    x: str = "volume",
+    y: str = "pressure",
+    label: str | None = None,
+) -> Axes:
+    """One quantity of a branch against another, on axes of its own or onto given ones; see :meth:`.Branch.plot`.
+
+    Raises
+    ------
+    InputError
+        For an empty branch, an unknown quantity, or a file that cannot be written.
+    """
+    _require_equilibria(branch)
+    if ax is None:
+        figure, ax = new_figure((6.4, 4.6), title=branch.scene.title if label is None else "")
+        show_in_notebooks(ax, figure)
+    draw_branch(ax, branch, across=x, up=y, label=label)
+    draw_legend(ax, _heading(branch))
+    whole = ax.get_figure(root=True)
+    if whole is not None:
+        save_figure(whole, path)
+    return ax
+
+
+def _heading(branch: Branch) -> str | None:
+    """Verdicts under a control are about axisymmetric shapes alone."""
+    return "among axisymmetric shapes:" if branch.scene.analysis.stability else None
 
 
 def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count: int = 6, *, zones: bool | None = None) -> Figure:

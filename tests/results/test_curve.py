@@ -156,3 +156,12 @@ def test_columns_as_arrays() -> None:
     branch = fm.inflate(SCENE, volumes=[0.5, 1.0], solver="newton")
     for name in (*PLACES, "elastic_energy", "magnetic_energy"):
         np.testing.assert_array_equal(getattr(branch, name), [getattr(eq, name) for eq in branch])
+
+
+def test_the_folder_of_a_run_is_loaded(tmp_path: Path) -> None:
+    branch = fm.inflate(SCENE, volumes=[0.5, 1.0], solver="newton")
+    branch.save(tmp_path / "branch.nc")
+    assert len(fm.load(tmp_path)) == 2
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(fm.InputError, match=r"no branch\.nc in this folder"):
+        fm.load(tmp_path / "empty")

@@ -14,7 +14,7 @@ from ..errors import Status
 from ..quantities import PLACES, axis_label
 from ..results.curve import half_way, turning
 from ..results.special_point import SpecialPoint
-from .figures import ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
+from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def draw_branch(
     points = shown.at(branch)
     controls = () if style else branch.scene.analysis.stability
     words = _words(branch, controls)
-    color = None if label is None else _named(axes, label)
+    color = None if label is None else _named(axes, label, AMONG if controls else None)
     _draw_lines(axes, _segments(shown, words), (lambda w: style) if style else style_of, color)
     if dots or (dots is None and len(points) <= _DOTS):
         for point, word in zip(points, words, strict=True):
@@ -239,11 +239,13 @@ def _lines(pieces: Sequence[_Segment | None], classify: Callable[[_Segment], Any
         kind = new
 
 
-def _named(axes: Axes, label: str) -> str:
-    """The colour of the next branch among several, which the legend then has under its name."""
+def _named(axes: Axes, label: str, heading: str | None) -> str:
+    """The colour of the next branch among several, which the legend then has under its name, and a heading for verdicts below."""
     before = [line for line in axes.lines if line.get_gid() == _BRANCH]
     color = COLORS[len(before) % len(COLORS)]
     axes.plot([], [], color=color, linewidth=3.0, label=label, gid=_BRANCH)
+    if heading is not None:
+        axes.plot([], [], " ", label=new_label(axes, heading))
     return color
 
 

@@ -56,10 +56,15 @@ ILL_POSED = Style("ill-posed (compressed or slack)", DOTTED, "#888888", 1.2)
 STABLE_UNDER = {c: Style(f"stable under {c} control", SOLID, BLUE) for c in ("pressure", "volume")}
 UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) for c in ("pressure", "volume")}
 
+#: what verdicts under a control are about, above them in a legend
+AMONG = "among axisymmetric shapes:"
 #: the order of the lines in a legend
 _ORDER = [
-    s.label
-    for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED, UNTESTED, UNRESOLVED)
+    AMONG,
+    *(
+        s.label
+        for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED, UNTESTED, UNRESOLVED)
+    ),
 ]
 #: in place of a verdict
 ILL_POSED_WORD = "ill-posed"

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..quantities import axis_label, caption
 from .branch_lines import MARKERS, draw_branch
 from .figures import (
+    AMONG,
     BOTH,
     MARGINAL,
     PLAIN,
@@ -105,7 +106,7 @@ def plot_branch(
         figure, ax = new_figure((6.4, 4.6), title=branch.scene.title if label is None else "")
         show_in_notebooks(ax, figure)
     draw_branch(ax, branch, across=x, up=y, label=label)
-    draw_legend(ax, _heading(branch))
+    draw_legend(ax, _heading(branch) if label is None else None)
     whole = ax.get_figure(root=True)
     if whole is not None:
         save_figure(whole, path)
@@ -114,7 +115,7 @@ def plot_branch(
 
 def _heading(branch: Branch) -> str | None:
     """Verdicts under a control are about axisymmetric shapes alone."""
-    return "among axisymmetric shapes:" if branch.scene.analysis.stability else None
+    return AMONG if branch.scene.analysis.stability else None
 
 
 def plot_profiles(branch: Branch, path: str | PathLike[str] | None = None, count: int = 6, *, zones: bool | None = None) -> Figure:

@@ -80,7 +80,14 @@ def test_several_branches_on_given_axes(branch: fm.Branch) -> None:
     assert branch.plot(ax=ax, label="Ogden") is ax
     untested.plot(ax=ax, label="neo-Hookean")
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert labels == ["Ogden", "neo-Hookean", "stable under both controls", "stable under volume control only", "stability not tested"]
+    assert labels == [
+        "Ogden",
+        "neo-Hookean",
+        "among axisymmetric shapes:",
+        "stable under both controls",
+        "stable under volume control only",
+        "stability not tested",
+    ]
     colors = {line.get_color() for line in ax.lines if line.get_label() in ("Ogden", "neo-Hookean")}
     assert len(colors) == 2
 

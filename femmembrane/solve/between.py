@@ -19,12 +19,17 @@ from .banded import BandFactor, BorderedFactor
 from .branch import BranchProblem, corrected
 from .continuation import StepControl, Tracer, trace_points
 from .controls import CONTROLS
-from .state import Predictor, State, hermite, joined
+from .start import moderate, start_at_volume
+from .state import Predictor, State, hermite, joined, rests_flat
 
 #: what a node knows of its place, in this order
 QUANTITIES = ("volume", "pressure", "center_height")
 #: cosine between the tangent and the row that fixes its length, below which it is found once more with itself as the row
 _ASLANT = 1e-3
+#: share of a moderate inflation that is next to none
+_SLIGHTLY = 1e-3
+#: steps along a branch that is only to be found again: what lies between them is interpolated, and measured
+_STRIDES, _MOST_STRIDES = StepControl(deviation=5e-3, turn=0.5), 200
 #: shares of an arc at which its bend is looked at
 _LOOKED_AT = (0.25, 0.5, 0.75)
 
@@ -42,11 +47,13 @@ class Direction:
 
 
 def direction_at(potential: Potential, x: Array, pressure: float) -> Direction | None:
-    """The direction of the branch at an equilibrium; None where it has none, as at a branch point, or the flat membrane at rest."""
+    """The direction of the branch at an equilibrium; None where it has none, as at a branch point."""
+    if not x.any() and potential.flat:
+        return _from_rest(potential) if rests_flat(potential) else None
     evaluation = potential.evaluate(x, pressure)
     border = evaluation.volume_gradient
     size = float(np.linalg.norm(border))
-    if not (evaluation.finite and size > 0 and x.any()):
+    if not (evaluation.finite and size > 0):
         return None
     problem, factor = BranchProblem(potential), BandFactor(evaluation.band)
     # dV and dP vanish together at a cusp only: one of two sums of them is a row that no other tangent is orthogonal to
@@ -63,6 +70,17 @@ def direction_at(potential: Potential, x: Array, pressure: float) -> Direction |
             dual = problem.dual(tangent)
             row, end = dual[:-1], float(dual[-1])
     return Direction(tangent, rates_along(potential, pressure, evaluation, tangent))
+
+
+def _from_rest(potential: Potential) -> Direction | None:
+    """The direction at the flat membrane at rest, which has no stiffness: that to a slightly inflated one, with P of third order."""
+    try:
+        state = start_at_volume(potential, _SLIGHTLY * moderate(potential))
+    except SolveError:
+        return None
+    length = BranchProblem(potential).norm(joined(state.x, 0.0))
+    rates = np.array([state.volume, 0.0, potential.space.center_height(state.x) - potential.space.first_height]) / length
+    return Direction(joined(state.x, 0.0) / length, rates)
 
 
 def rates_along(potential: Potential, pressure: float, evaluation: Evaluation, tangent: Array) -> Array:
@@ -177,7 +195,7 @@ def across(problem: BranchProblem, arc: Arc, share: float) -> State | None:
 
 def followed(problem: BranchProblem, arc: Arc) -> list[State]:
     """Equilibria on the way from one end of an arc to the other, by arc length; none where the branch does not lead there."""
-    potential, steps = problem.potential, StepControl()
+    potential, steps = problem.potential, _STRIDES
     if arc.a.direction is None or arc.b.direction is None:
         return []
     x, pressure = arc.a.z[:-1], float(arc.a.z[-1])
@@ -187,12 +205,12 @@ def followed(problem: BranchProblem, arc: Arc) -> list[State]:
         point, found = problem.point(start, tangent), list[State]()
         tracer = Tracer(Predictor(), min(steps.first, arc.length / 8), steps)
         try:
-            for new in islice(trace_points(problem, point, tracer), 40 + int(4 * arc.length / steps.largest)):
+            for new in islice(trace_points(problem, point, tracer), _MOST_STRIDES):
                 before, after = float(end @ (point.z - arc.b.z)), float(end @ (new.z - arc.b.z))
                 if before * after <= 0:
                     share = before / (before - after) if before != after else 0.0
                     miss = problem.norm(point.z + share * (new.z - point.z) - arc.b.z)
-                    if miss < 0.1 * problem.norm(new.z - point.z):
+                    if miss < 0.2 * problem.norm(new.z - point.z):
                         return found
                 found.append(new.state)
                 point = new

@@ -121,6 +121,25 @@ def test_states_between(place: str) -> None:
     assert branch.at(**{place: getattr(branch[3], place)}) is branch[3]
 
 
+def test_a_run_too_coarse_for_cubics_is_followed() -> None:
+    """From V = 0.1 to 60 in one step: the peak between them is found, by arc length, and is that of a trace."""
+    branch = fm.inflate(SCENE, volumes=[0.1, 60.0], solver="newton")
+    limit = fm.trace(SCENE, start=2.0, until={"volume": 4.0}).special_points[0]
+    points = drawn(branch)
+    assert points[:, 1].max() == pytest.approx(limit.pressure, rel=1e-3)
+    assert branch.curve.added > 5
+    assert len(branch) == 2  # what is computed for the drawing is no step
+
+
+def test_through_the_flat_membrane_at_rest() -> None:
+    """P = 3.3367 V^3 there: the curve is level where it passes, and odd."""
+    branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volumes=[-0.4, 0.0, 0.4], solver="newton")
+    for volume in (-0.1, 0.1):
+        between, solved = (branch.at(volume=volume, refine=refine) for refine in (False, True))
+        assert solved.pressure == pytest.approx(3.3367 * volume**3, rel=0.02)
+        assert between.pressure == pytest.approx(solved.pressure, abs=1e-3 * branch[-1].pressure)
+
+
 def test_one_of_several_crossings() -> None:
     branch = fm.inflate(SCENE, volumes=np.linspace(0.5, 40.0, 20), solver="newton")
     found = [branch.at(pressure=1.53, refine=True, crossing=k) for k in range(3)]

@@ -6,8 +6,10 @@ the figures read the same in grey.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
 
 _DPI = 160
+_LIVE_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42}
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,10 @@ class Style:
 SOLID, DASHED, DOTTED = "-", (0, (5, 2)), (0, (1, 1.4))
 BLUE, ORANGE, BLACK, RED = "#0072b2", "#d55e00", "#222222", "#a01040"
 PLAIN = Style("", SOLID, BLUE)
+#: a branch whose stability nobody asked for
+UNTESTED = Style("stability not tested", SOLID, "0.62", 1.8)
+#: between two equilibria that no curve was found for
+UNRESOLVED = Style("not resolved between steps", (0, (1, 3)), "0.5", 1.2)
 MARGINAL = Style("marginal (an eigenvalue is zero)", (0, (6, 1.5, 1, 1.5)), BLACK)
 BOTH = Style("stable under both controls", SOLID, BLUE)
 VOLUME_ONLY = Style("stable under volume control only", DASHED, ORANGE)
@@ -49,8 +56,16 @@ ILL_POSED = Style("ill-posed (compressed or slack)", DOTTED, "#888888", 1.2)
 STABLE_UNDER = {c: Style(f"stable under {c} control", SOLID, BLUE) for c in ("pressure", "volume", "gas")}
 UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) for c in ("pressure", "volume", "gas")}
 
+#: what verdicts under a control are about, above them in a legend
+AMONG = "among axisymmetric shapes:"
 #: the order of the lines in a legend
-_ORDER = [s.label for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED)]
+_ORDER = [
+    AMONG,
+    *(
+        s.label
+        for s in (BOTH, *STABLE_UNDER.values(), VOLUME_ONLY, *UNSTABLE_UNDER.values(), UNSTABLE, MARGINAL, ILL_POSED, UNTESTED, UNRESOLVED)
+    ),
+]
 #: in place of a verdict
 ILL_POSED_WORD = "ill-posed"
 
@@ -63,7 +78,7 @@ def verdict_style(equilibrium: Equilibrium, controls: Sequence[str] = ("pressure
 def style_of(words: Mapping[str, str]) -> Style:
     """The style of a class of equilibria: the verdict under each control asked for."""
     if not words:
-        return PLAIN
+        return UNTESTED
     if ILL_POSED_WORD in words.values():
         return ILL_POSED
     if "marginal" in words.values():
@@ -75,6 +90,31 @@ def style_of(words: Mapping[str, str]) -> Style:
     return UNSTABLE if words["volume"] == "unstable" else BOTH if words["pressure"] == "stable" else VOLUME_ONLY
 
 
+def shown_figure(size: tuple[float, float]) -> Figure:
+    """An empty figure of a size in inches, which a notebook shows as a picture wherever it is the last value of a cell."""
+    load()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    show_in_notebooks(figure, figure)
+    return figure
+
+
+def show_in_notebooks(shown: Any, figure: Figure) -> None:
+    """Let a notebook show a figure, or axes of it, as a picture: without pyplot it would print their names."""
+    shown._repr_png_ = partial(png, figure)
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as the content of a PNG file for a screen."""
+    file = io.BytesIO()
+    with drawing():
+        figure.savefig(file, format="png", dpi=110)
+    return file.getvalue()
+
+
 def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[float] = (1.0,)) -> tuple[Figure, Any]:
     """A figure of a size in inches with one axes, or a row of several of the given relative widths.
 
@@ -83,12 +123,7 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
     figure : Figure
     axes : Axes, or array of Axes
     """
-    load()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = shown_figure(size)
     row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
     for axes in row:
         axes.spines[["top", "right"]].set_visible(False)
@@ -101,15 +136,25 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
 
 
 def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
-    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes."""
+    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes.
+
+    Text in SVG and PDF files stays text, which programs for drawing can edit.
+    """
     if path is not None:
         formats = figure.canvas.get_supported_filetypes()
         if Path(path).suffix[1:].lower() not in formats:
             raise InputError(
                 "path", str(path), "a name that ends in one of these is needed: " + ", ".join(f".{f}" for f in sorted(formats))
             )
-        with replace_file(path) as temporary, drawing():
-            figure.savefig(temporary, dpi=_DPI)
+        from matplotlib import rc_context
+
+        with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT):
+            try:
+                figure.savefig(temporary, dpi=_DPI)
+            except (RuntimeError, FileNotFoundError) as error:
+                if Path(path).suffix.lower() != ".pgf":
+                    raise
+                raise InputError("path", str(path), "LaTeX is needed for PGF (xelatex on the search path)") from error
     return figure
 
 
@@ -123,7 +168,13 @@ def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
 
 
 def legend_entries(axes: Axes) -> tuple[list[Any], list[str]]:
-    """Handles and labels of what is named, the verdicts first, then wrinkles, and these always in the same order."""
+    """Handles and labels of what is named: branches, verdicts, wrinkles, and whatever else, always in the same order."""
     named = list(zip(*axes.get_legend_handles_labels(), strict=True))
-    named.sort(key=lambda item: _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER) + zone_order(item[1]))
+
+    def place(item: tuple[Any, str]) -> int:
+        if item[0].get_gid() is not None:
+            return -1
+        return _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER) + zone_order(item[1])
+
+    named.sort(key=place)
     return [handle for handle, _ in named], [label for _, label in named]

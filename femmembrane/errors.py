@@ -37,6 +37,7 @@ class Status(StrEnum):
     ACCURACY_NOT_MET = "accuracy not met"
     INTERRUPTED = "interrupted"
     CLOSED = "closed branch"
+    INTERPOLATED = "interpolated"
 
     @property
     def advice(self) -> str:
@@ -60,6 +61,7 @@ _ADVICE = {
     Status.ACCURACY_NOT_MET: "ask for less (mesh.accuracy), or give mesh.elements and mesh.degree",
     Status.INTERRUPTED: "what was computed is kept; continue from there",
     Status.CLOSED: "the branch came back to the branch point where it set out: going on would trace it once more",
+    Status.INTERPOLATED: "it lies on the cubic between two equilibria; branch.at(..., refine=True) finds the equilibrium itself",
     Status.NOT_RESOLVED: "the mesh makes this state: make elements smaller where it says (towards a pole with mesh.ratio or mesh.radii), "
     "take more of them or a higher degree; a state that finer meshes lose does not exist",
     Status.LEGENDRE_FAILURE: "a membrane cannot carry compression: where it is compressed the plain energy is ill-posed and its states "

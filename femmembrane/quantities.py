@@ -210,6 +210,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "trace_slope": Quantity("their derivatives with respect to arc length or load"),
     "jump_index": Quantity("number of the equilibrium that a snap of the membrane landed on", type=int),
     "jump_limit": Quantity("whether the fold before the snap was located", type=int),
+    "jump_held": Quantity("what the run prescribed when the membrane snapped", type=str),
     "fraction_taut": Quantity("part of the reference area that is taut"),
     "fraction_radial": Quantity("part of the reference area with radial wrinkles (only s22 < 0)"),
     "fraction_circumferential": Quantity("part of the reference area with circumferential wrinkles (only s11 < 0)"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -19,6 +20,7 @@ from .special_point import Jump, SpecialPoint
 
 if TYPE_CHECKING:
     from ..scene import Scene
+    from .curve import BranchCurve
     from .zones import ZonesAlong
 
 
@@ -95,6 +97,7 @@ class Branch(Sequence[Equilibrium]):
     remarks: tuple[str, ...] = ()
     over: str = ""
     hold: Mapping[str, float] = field(default_factory=dict)
+    _drawn: list[BranchCurve] = field(default_factory=list, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.equilibria)
@@ -107,11 +110,123 @@ class Branch(Sequence[Equilibrium]):
 
     def __getitem__(self, index: int | slice) -> Equilibrium | Branch:
         if isinstance(index, slice):
-            return replace(self, equilibria=self.equilibria[index], special_points=None, memory=None, jumps=())
+            return replace(self, equilibria=self.equilibria[index], special_points=None, memory=None, jumps=self._jumps_in(index))
         return self.equilibria[index]
 
     def __iter__(self) -> Iterator[Equilibrium]:
         return iter(self.equilibria)
+
+    def _jumps_in(self, part: slice) -> tuple[Jump, ...]:
+        """The snaps between equilibria of a part that goes the same way."""
+        kept = range(len(self))[part]
+        if kept.step < 0:
+            return ()
+        landed = ((bisect_left(kept, jump.index), jump) for jump in self.jumps)
+        return tuple(replace(jump, index=k, landing=self[kept[k]]) for k, jump in landed if 0 < k < len(kept))
+
+    @property
+    def volume(self) -> NDArray[Any]:
+        """Enclosed volume of every equilibrium over R0^3."""
+        return self.column("volume")
+
+    @property
+    def pressure(self) -> NDArray[Any]:
+        """P of every equilibrium."""
+        return self.column("pressure")
+
+    @property
+    def center_height(self) -> NDArray[Any]:
+        """Height of the pole of every equilibrium over R0."""
+        return self.column("center_height")
+
+    @property
+    def elastic_energy(self) -> NDArray[Any]:
+        """Elastic energy of every equilibrium in units of mu T R0^2."""
+        return self.column("elastic_energy")
+
+    @property
+    def magnetic_energy(self) -> NDArray[Any]:
+        """Magnetic energy of every equilibrium in units of mu T R0^2; zeros without sources."""
+        return self.column("magnetic_energy")
+
+    @property
+    def curve(self) -> BranchCurve:
+        """What lies between the equilibria; found when first asked for, at about the cost of a third of the branch."""
+        from .curve import BranchCurve
+
+        if not self._drawn:
+            self._drawn.append(BranchCurve(self))
+        return self._drawn[0]
+
+    def at(
+        self,
+        *,
+        volume: float | None = None,
+        pressure: float | None = None,
+        center_height: float | None = None,
+        refine: bool = False,
+        crossing: int = 0,
+    ) -> Equilibrium:
+        """The state at a volume, a pressure or a height of the pole, between equilibria of the branch.
+
+        It lies on the cubic between two equilibria, with the tangents of the branch there, and its status is ``interpolated``: its
+        ``residual`` says how far forces are out of balance. Where an equilibrium of the branch has the value, it is that one.
+
+        Parameters
+        ----------
+        volume, pressure, center_height : float
+            Exactly one of them.
+        refine : bool
+            Solve for the equilibrium there. It has the value that was asked for exactly.
+        crossing : int
+            Which one, where the branch passes the value several times: 0 for the first, -1 for the last.
+
+        Raises
+        ------
+        InputError
+            When the branch does not pass the value, or not so many times, and for a branch over a number.
+        SolveError
+            When the equilibrium cannot be solved for, as at a fold in the quantity.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volumes=[0.5, 1.0, 2.0])
+        >>> between, solved = branch.at(volume=1.5), branch.at(volume=1.5, refine=True)
+        >>> between.status.value, round(between.pressure, 3), solved.status.value, round(solved.pressure, 3)
+        ('interpolated', 1.584, 'converged', 1.584)
+        """
+        from .between_equilibria import state_at
+
+        return state_at(self, {"volume": volume, "pressure": pressure, "center_height": center_height}, refine, crossing)
+
+    def resample(self, count: int, *, refine: bool = False) -> Branch:
+        """The branch with so many states, evenly spread along it.
+
+        Ends of the branch and of its parts before and after snaps are kept. Other states are interpolated, as in :meth:`at`.
+
+        Parameters
+        ----------
+        count : int
+            At least two for the branch, and two more for each snap.
+        refine : bool
+            Solve for the equilibria.
+
+        Raises
+        ------
+        InputError, SolveError
+            As :meth:`at`.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> branch = fm.inflate(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), volumes=[0.5, 1.0, 2.0])
+        >>> [str(eq.status) for eq in branch.resample(4)]
+        ['converged', 'interpolated', 'interpolated', 'converged']
+        """
+        from .between_equilibria import resampled
+
+        return resampled(self, count, refine)
 
     def column(self, name: str) -> NDArray[Any]:
         """One column of the table.
@@ -203,22 +318,54 @@ class Branch(Sequence[Equilibrium]):
         """
         door.write_vtk(self, path)
 
-    def plot(self, path: str | PathLike[str] | None = None, *, units: str = "scaled") -> Any:
-        """Pressure against volume as a Matplotlib figure; over a number what answers to it, at what is held.
+    def plot(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        ax: Any = None,
+        x: str | None = None,
+        y: str | None = None,
+        label: str | None = None,
+        units: str = "scaled",
+    ) -> Any:
+        """Any quantity of the branch against any other, on Matplotlib axes.
+
+        The line goes along the :attr:`curve` of the branch. Line styles tell the verdicts that the scene asked for. Markers are the special
+        points found.
 
         Parameters
         ----------
         path : path, optional
-            Where the figure is also written.
+            Where the figure is also written: PNG, PDF, SVG, PGF or what else Matplotlib writes.
+        ax : matplotlib Axes, optional
+            Where to draw, for several branches in one picture. Default: axes of a new figure.
+        x, y : str, optional
+            Columns of the branch that are numbers, such as ``center_height``, ``lambda_pressure`` or ``step``, or a number of the scene by
+            its name. Default: pressure against volume; over a number what answers to it, at what is held.
+        label : str, optional
+            Name of the branch in the legend. The branch then has a colour of its own, and its dashes tell verdicts.
         units : {"scaled", "si"}
             In units of the package, or in SI units such as ml and kPa, by the scales of the scene.
+
+        Returns
+        -------
+        matplotlib Axes
 
         Raises
         ------
         InputError
-            For a file that cannot be written, and for SI units of a scene without scales.
+            For an empty branch, an unknown quantity, a file that cannot be written, and SI units of a scene without scales.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> thin, thick = (fm.Scene(material=fm.MooneyRivlin(ratio=r), mesh=fm.disc(16)) for r in (0.05, 0.2))
+        >>> ax = fm.inflate(thin, volumes=[0.5, 1.0, 2.0, 4.0]).plot(x="center_height", label="ratio 0.05")
+        >>> ax = fm.inflate(thick, volumes=[0.5, 1.0, 2.0, 4.0]).plot(ax=ax, x="center_height", label="ratio 0.2")
+        >>> [text.get_text() for text in ax.get_legend().get_texts()]
+        ['ratio 0.05', 'ratio 0.2', 'stability not tested']
         """
-        return door.plot_pressure_volume(self, path, units)
+        return door.plot_branch(self, path, ax, x, y, label, units)
 
     def report(self, path: str | PathLike[str], *, units: str = "scaled") -> None:
         """Write one HTML page with what the branch has: figures, verdicts, special points, zones, errors, scene, timings.

@@ -196,6 +196,10 @@ class Convergence:
         """
         return door.plot_convergence(self, path, quantities=quantities, against=against)
 
+    def _repr_html_(self) -> str:
+        """The picture and the table, for notebooks."""
+        return door.study_html(self, "Errors over cost")
+
     def __str__(self) -> str:
         names = [q for q in self.errors if q not in ("elastic_energy", "magnetic_energy")]
         lines = [self.scene.title] if self.scene.title else []

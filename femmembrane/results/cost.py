@@ -153,6 +153,10 @@ class Cost:
         """The solves that no other solve with the same start beats in both time and error: warm ones first, and the fastest first."""
         return tuple(sorted((line for line in self.lines if line.front), key=lambda line: (STARTS.index(line.start), line.milliseconds)))
 
+    def _repr_html_(self) -> str:
+        """The picture and the table, for notebooks."""
+        return door.study_html(self, "Error over wall time")
+
     def __str__(self) -> str:
         return "\n".join(_text(self))
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .branch import Branch
     from .convergence import Convergence
     from .cost import Cost
+    from .equilibria import Equilibria
     from .equilibrium import Equilibrium
     from .error_estimate import ErrorEstimate
     from .folds import FoldCurve
@@ -98,6 +99,15 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     return plot_pressure_volume(branch, path, units=units)
 
 
+def plot_branch(
+    branch: Branch, path: str | PathLike[str] | None, ax: Any, x: str | None, y: str | None, label: str | None, units: str
+) -> Any:
+    """See :func:`femmembrane.views.plots.plot_branch`."""
+    from ..views.plots import plot_branch
+
+    return plot_branch(branch, path, ax=ax, x=x, y=y, label=label, units=units)
+
+
 def plot_zones(branch: Branch, path: str | PathLike[str] | None = None) -> Any:
     """See :func:`femmembrane.views.plots.plot_zones`."""
     from ..views.plots import plot_zones
@@ -173,3 +183,38 @@ def equilibrium_html(equilibrium: Equilibrium) -> str:
     from ..views.notebook import equilibrium_html
 
     return equilibrium_html(equilibrium)
+
+
+def zones_html(zones: Zones) -> str:
+    """See :func:`femmembrane.views.notebook.zones_html`."""
+    from ..views.notebook import zones_html
+
+    return zones_html(zones)
+
+
+def equilibria_html(found: Equilibria) -> str:
+    """See :func:`femmembrane.views.notebook.equilibria_html`."""
+    from ..views.notebook import equilibria_html
+
+    return equilibria_html(found)
+
+
+def fold_curve_html(curve: FoldCurve) -> str:
+    """See :func:`femmembrane.views.notebook.fold_curve_html`."""
+    from ..views.notebook import fold_curve_html
+
+    return fold_curve_html(curve)
+
+
+def error_estimate_html(estimate: ErrorEstimate) -> str:
+    """See :func:`femmembrane.views.notebook.error_estimate_html`."""
+    from ..views.notebook import error_estimate_html
+
+    return error_estimate_html(estimate)
+
+
+def study_html(study: Convergence | Cost | Sweep, label: str) -> str:
+    """See :func:`femmembrane.views.notebook.study_html`."""
+    from ..views.notebook import study_html
+
+    return study_html(study, label)

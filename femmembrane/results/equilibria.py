@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from ..quantities import PLACES, words, written
+from . import door
 from .equilibrium import Equilibrium
 
 
@@ -40,6 +41,10 @@ class Equilibria(Sequence[Equilibrium]):
 
     def __iter__(self) -> Iterator[Equilibrium]:
         return iter(self.found)
+
+    def _repr_html_(self) -> str:
+        """Meridians and a table, for notebooks."""
+        return door.equilibria_html(self)
 
     def __str__(self) -> str:
         lines = [f"{len(self)} equilibria at {self.control} {self.load:.9g}; {self.searched}"]

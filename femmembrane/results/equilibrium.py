@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
-_OF_POTENTIAL = ("verdict", "errors")
+_OF_POTENTIAL = ("verdict", "errors", "tangent")
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..quantities import words
 from ..solve.controls import CONTROLS, control_kind
+from . import door
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,10 @@ class ErrorEstimate:
     lambda_volume: Deviation
     method: str
     reason: str = ""
+
+    def _repr_html_(self) -> str:
+        """A table of values and errors, for notebooks."""
+        return door.error_estimate_html(self)
 
     def __str__(self) -> str:
         lines = [f"at the same {CONTROLS[self.control].words}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]

@@ -83,6 +83,10 @@ class FoldCurve:
     def __len__(self) -> int:
         return len(self.equilibria)
 
+    def _repr_html_(self) -> str:
+        """The picture and the cusps, for notebooks."""
+        return door.fold_curve_html(self)
+
     def __str__(self) -> str:
         width = max(14, len(self.parameter))
         lines = [FOLD_NAMES[self.kind], f"{self.parameter:>{width}} " + " ".join(f"{words(name):>14}" for name in _COLUMNS)]

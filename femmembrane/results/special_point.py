@@ -69,8 +69,11 @@ class Jump:
         The fold at which the branch turned back before the load, or the branch point at which it lost its stability. From a branch point
         another branch leads to the landing.
     landing : Equilibrium
+    held : str
+        What the run prescribed: pressure, volume or center_height; empty where that was not noted, or is none of them.
     """
 
     index: int
     limit: SpecialPoint | None
     landing: Equilibrium
+    held: str = ""

@@ -11,6 +11,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from os import PathLike
+from os.path import exists, isdir, join
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,7 +84,7 @@ def load(path: str | PathLike[str]) -> Branch:
     Parameters
     ----------
     path : path
-        A file that :meth:`Branch.save` or a run wrote.
+        A file that :meth:`Branch.save` or a run wrote, or the folder of a run.
 
     Returns
     -------
@@ -107,6 +108,10 @@ def load(path: str | PathLike[str]) -> Branch:
     >>> bool((again.column("pressure") == branch.column("pressure")).all())
     True
     """
+    if isdir(path):
+        path = join(path, "branch.nc")
+        if not exists(path):
+            raise InputError("path", str(path), "there is no branch.nc in this folder: the folder of a run is allowed")
     return branch_of(read_branch_file(path), path)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -165,6 +166,7 @@ def jump_variables(jumps: Sequence[Jump], width: int, over: str) -> dict[str, Va
     return {
         "jump_index": (("jump",), typed("jump_index", (jump.index for jump in jumps))),
         "jump_limit": (("jump",), typed("jump_limit", (jump.limit is not None for jump in jumps))),
+        "jump_held": (("jump",), typed("jump_held", (jump.held for jump in jumps))),
         **special_variables(limits, width, LIMIT, over),
     }
 
@@ -177,7 +179,8 @@ def jumps_of(dataset: xarray.Dataset, scene: Scene, over: str, equilibria: tuple
     located = list(zip(dataset["jump_index"].values.tolist(), dataset["jump_limit"].values.tolist(), strict=True))
     if not all(0 <= index < len(equilibria) for index, _ in located):
         raise ValueError("a snap lands on no equilibrium")
-    return tuple(Jump(index, next(limits) if known else None, equilibria[index]) for index, known in located)
+    held = map(str, dataset["jump_held"].values) if "jump_held" in dataset else repeat("")  # younger than the format
+    return tuple(Jump(index, next(limits) if known else None, equilibria[index], word) for (index, known), word in zip(located, held))  # noqa: B905
 
 
 def _finite(dataset: xarray.Dataset, name: str, *shape: int) -> Array:

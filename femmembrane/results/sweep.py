@@ -50,6 +50,10 @@ class Sweep:
     def __len__(self) -> int:
         return math.prod(len(values) for values in self.over.values())
 
+    def _repr_html_(self) -> str:
+        """The maps and a summary, for notebooks."""
+        return door.study_html(self, "Maps over the keys of the sweep")
+
     def __str__(self) -> str:
         keys = ", ".join(f"{key} ({len(values)} values)" for key, values in self.over.items())
         statuses, counts = np.unique(self._dataset["status"].values, return_counts=True)

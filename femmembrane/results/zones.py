@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import choice
+from . import door
 
 #: kinds of zones; the place of a kind is its number
 KINDS = ("taut", "radial", "circumferential", "double")
@@ -118,6 +119,10 @@ class Zones(Sequence[Zone]):
         """In a few words: taut, or each kind of wrinkles with its part of the reference area."""
         found = [f"{kind} {100 * self.fraction(kind):.3g}%" for kind in KINDS[1:] if kind in self.kinds]
         return ", ".join(found) or "taut"
+
+    def _repr_html_(self) -> str:
+        """A table of the zones, for notebooks."""
+        return door.zones_html(self)
 
     def __str__(self) -> str:
         return "\n".join([f"zones by the signs of the {self.criterion} stresses", *(f"  {zone}" for zone in self)])

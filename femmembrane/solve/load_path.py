@@ -15,7 +15,7 @@ from .minimize import is_minimum, minimize_and_verify
 from .newton import TOLERANCE, correct
 from .search import Limit, beyond_crossing, beyond_limit, loss_before
 from .segment import ON_FOLD, Located
-from .start import cold_start, moderate
+from .start import cold_start, moderate, start_at_volume
 from .state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from .state_resolution import refuse_unresolved
 from .stepping import Corrector, march
@@ -195,9 +195,12 @@ class LoadPath:
         return self._arrived(state, load, turn)
 
     def _begin_before(self, load: float, failure: SolveError) -> None:
-        """Stand at the moderately inflated membrane on the way to a volume at which sources could not be turned on: steps from there reach
-        it, or meet the fold that is the reason."""
+        """Stand at the moderately inflated membrane on the way to a volume at which sources could not be turned on, or to a pressure at
+        which nothing was found: steps from there reach it, or meet the fold that is the reason."""
         rest, size = self.potential.space.reference_volume, moderate(self.potential)
+        if self.held is CONTROLS["pressure"] and failure.status is Status.NO_EQUILIBRIUM and self._minima:
+            self._begin_below(rest + float(np.copysign(size, load)), load, failure)
+            return
         by_volume = self.held is CONTROLS["volume"]
         if not by_volume or failure.status.ill_posed or abs(load - rest) <= size or not self.potential.surrounded:
             raise failure
@@ -207,6 +210,16 @@ class LoadPath:
             self.memory = Predictor()
         except SolveError:
             raise failure from None
+
+    def _begin_below(self, volume: float, load: float, failure: SolveError) -> None:
+        """Stand at the stable membrane at a volume, if its pressure is on the way to the one that was asked for."""
+        try:
+            state = start_at_volume(self.potential, volume)
+        except SolveError:
+            raise failure from None
+        if not (abs(state.pressure) < abs(load) and self._stable(state.pressure)(state)):
+            raise failure
+        self.go_on(state, state.pressure, Predictor())
 
     def _first(self, load: float, jump: bool) -> tuple[State, Turn | None]:
         """The state of a cold start, and where its branch became unstable if it is one of another branch."""

@@ -173,7 +173,8 @@ class LoadRun(Run[Branch]):
             own, scene = self.own(state), self.scene_of(state)
             new = record(scene, own.evaluation.potential, own, self.found[-1] if self.found else None, clock, self.gas)
         if turn is not None:
-            self.jumps.append(Jump(index, self._limit(turn), new))
+            held = self.request.held.name
+            self.jumps.append(Jump(index, self._limit(turn), new, held if held in CONTROLS else ""))
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(index, len(loads), new)

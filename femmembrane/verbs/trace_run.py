@@ -275,7 +275,19 @@ class TraceRun(Run[Branch]):
         if self.shortfall is not None:
             return Status.ACCURACY_NOT_MET, str(self.shortfall)
         message = f"{self.request.max_steps} steps were made without meeting {dict(self.request.targets) or 'an end'}"
+        if away := self._went_away():
+            message = f"{message}; {away}"
         return self._explained(Status.STEP_LIMIT, message)
+
+    def _went_away(self) -> str:
+        """Advice for a branch that left all values behind at which it was to end; empty where it did not."""
+        request, known = self.request, not isinstance(self.request.start, Branch)
+        ways = [(abs(getattr(eq, q) - v) for eq in (self.found[0], self.found[1], self.found[-1])) for q, v in request.targets.items()]
+        if not (known and ways and all(first < second < last for first, second, last in ways)):
+            return ""
+        quantity, value = next(iter(request.targets.items()))
+        begun = f"it set out from {CONTROLS[quantity].words} {getattr(self.found[0], quantity):.6g}, away from {value:.6g}"
+        return f"{begun}: direction = {-request.direction} sets out the other way"
 
     def _explained(self, status: Status, message: str) -> End:
         """An end, unless a special point that must have been passed was not located."""

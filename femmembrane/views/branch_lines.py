@@ -4,28 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import Status, unknown_name
+from ..errors import Status
 from ..quantities import PLACES, Units, axis_label, key_label
+from ..results.curve import half_way, turning
 from ..results.special_point import SpecialPoint
-from .figures import ILL_POSED_WORD, PLAIN, RED, Style, style_of
+from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..results.branch import Branch
+    from ..results.curve import Piece, Snap
     from ..results.equilibrium import Equilibrium
 
 Array = NDArray[np.float64]
 
 #: branches of up to so many equilibria show them as dots
 _DOTS = 40
+#: colours of several branches in one picture: for the colour-blind too, and of different lightness
+COLORS = ("#0072b2", "#d55e00", "#222222", "#56b4e9", "#a01040", "#e69f00", "#009e73")
+#: what tells the entry of a branch in a legend from other lines
+_BRANCH = "femmembrane branch"
 #: marker and name of each kind of special point
 MARKERS = {
     "limit_point": ("o", "limit point (dP = 0)"),
@@ -45,26 +51,30 @@ def draw_branch(
     up: str = "pressure",
     units: str = "scaled",
     style: Style | None = None,
+    label: str | None = None,
     dots: bool | None = None,
     special_points: bool = True,
 ) -> None:
     """One quantity of a branch against another: verdicts as line styles, special points as markers, snaps as arrows.
 
-    A style changes at the special point where the verdict does, or half-way between two equilibria. A branch whose scene asks for no
-    verdicts is one plain line. Stretches that are unstable to an azimuthal mode have a grey band behind them; if the scene asks for
-    wrinkling, bands with patterned edges say which wrinkles the membrane has anywhere. A cross marks the end of a branch that
-    could not be followed as far as was asked.
+    The line goes through all equilibria and special points along the :attr:`.Branch.curve`. A style changes at the special point where the
+    verdict does, or half-way between two equilibria. A branch whose scene asks for no verdicts is one grey line, named not tested.
+    Stretches that are unstable to an azimuthal mode have a grey band behind them; if the scene asks for wrinkling, bands with patterned
+    edges say which wrinkles the membrane has anywhere. A cross marks the end of a branch that could not be followed as far as was asked.
 
     Parameters
     ----------
     axes : matplotlib Axes
     branch : Branch
-    across, up : {"volume", "pressure", "center_height"}
-        What the axes show; of a branch over a number also that, by its name.
+    across, up : str
+        What the axes show: volume, pressure, center_height, any column of the branch that is a number, or a number of the scene by its
+        name.
     units : {"scaled", "si"}
         In units of the package, or in SI units such as ml and kPa, by the scales of the scene; numbers on the axes are those of the label.
     style : Style, optional
         One style for the whole line, in place of the verdicts'.
+    label : str, optional
+        Name of the branch among several. It then has the next of :data:`COLORS`, and dashes tell the verdicts.
     dots : bool, optional
         Show each equilibrium as a dot; by default when there are few.
     special_points : bool
@@ -75,44 +85,72 @@ def draw_branch(
     InputError
         For an unknown quantity or word, and for SI units of a scene without scales.
     """
-    for key, name in (("across", across), ("up", up)):
-        if name not in (*PLACES, branch.over):
-            raise unknown_name(key, name, [*PLACES, *([branch.over] if branch.over else [])])
     of_scene = Units.of(units, branch.scene.scales)
+    shown = _Shown(branch, (across, up), of_scene)
     axes.set_xlabel(_label(across, of_scene))
     axes.set_ylabel(_label(up, of_scene))
-    shown = _Shown((across, up), np.array([_factor(across, of_scene), _factor(up, of_scene)]))
     axes.grid(color="0.9", linewidth=0.6)
     points = shown.at(branch)
-    gaps = _gaps(branch, shown)
     controls = () if style else branch.scene.analysis.stability
     words = _words(branch, controls)
-    drawn = style or PLAIN
-    _draw_lines(axes, _segments(points, words, gaps), (lambda w: drawn) if style else style_of)
+    color = None if label is None else _named(axes, label, AMONG if controls else None)
+    _draw_lines(axes, _segments(shown, words), (lambda w: style) if style else style_of, color)
     if dots or (dots is None and len(points) <= _DOTS):
         for point, word in zip(points, words, strict=True):
-            axes.plot(*point, ".", color=(style or style_of(word)).color, markersize=6 if len(points) < 3 else 4, zorder=3)
+            axes.plot(*point, ".", color=color or (style or style_of(word)).color, markersize=6 if len(points) < 3 else 4, zorder=3)
     if not style:
-        _draw_azimuthal(axes, branch, points, gaps)
+        _draw_azimuthal(axes, branch, shown)
         if branch.scene.analysis.wrinkling:
-            _draw_wrinkling(axes, branch, points, gaps)
-    _draw_jumps(axes, branch, shown)
+            _draw_wrinkling(axes, branch, shown)
+    _draw_jumps(axes, shown)
     if special_points:
         _draw_special_points(axes, branch, shown)
     if branch.status is not Status.CONVERGED and len(points):
         axes.plot(*points[-1], "X", color=RED, markeredgecolor="white", markersize=10, zorder=5, label=f"ends here: {branch.status}")
 
 
-@dataclass(frozen=True, eq=False)
 class _Shown:
-    """What the axes show: two quantities, each times a factor."""
+    """What the axes show of a branch: two quantities, each times a factor."""
 
-    quantities: tuple[str, str]
-    factors: Array
+    def __init__(self, branch: Branch, quantities: tuple[str, str], units: Units) -> None:
+        self.quantities, self.curve = quantities, branch.curve
+        for name in quantities:
+            if name not in PLACES:
+                self.curve.reader(name)  # refuses what cannot be shown
+        self.factors = np.array([_factor(name, units) for name in quantities])
+        self._lines = {key: line * self.factors for key, line in self.curve.lines(quantities).items()}
 
     def at(self, items: Sequence[Equilibrium | SpecialPoint]) -> Array:
-        """Places in the picture."""
-        return _coordinates(items, self.quantities) * self.factors
+        """Places in the picture of the steps of the branch, or of special points."""
+        values = [[self._value(k, item, q) for q in self.quantities] for k, item in enumerate(items)]
+        return np.array(values, dtype=float).reshape(-1, 2) * self.factors
+
+    def _value(self, number: int, item: Equilibrium | SpecialPoint, quantity: str) -> float:
+        if quantity in PLACES:
+            return float(getattr(item, quantity))
+        step, equilibrium = (self._between(item), item.equilibrium) if isinstance(item, SpecialPoint) else (number, item)
+        return step if quantity == "step" else float(self.curve.reader(quantity)(number, equilibrium))
+
+    def _between(self, point: SpecialPoint) -> float:
+        """The number that a special point has among the steps."""
+        for k, gap in enumerate(self.curve.gaps):
+            if any(piece.b.special is point for stretch in gap.stretches for piece in stretch):
+                return k + 0.5
+        return float("nan")
+
+    def ends(self, snap: Snap) -> Array:
+        """Both ends of the arrow of a snap."""
+        return np.array([[self.curve.value(point, q) for q in self.quantities] for point in (snap.tail, snap.tip)]) * self.factors
+
+    def line(self, pieces: Sequence[Piece]) -> Array:
+        """Pieces of the curve as one polygon."""
+        lines = [self._lines[id(piece)] for piece in pieces]
+        return np.concatenate([lines[0], *(line[1:] for line in lines[1:])])
+
+    def parameters(self, pieces: Sequence[Piece]) -> Array:
+        """Where the corners of this polygon lie: number of the piece plus share of it."""
+        counts = [len(self._lines[id(piece)]) - 1 for piece in pieces]
+        return np.concatenate([[0.0], *(k + np.arange(1, count + 1) / count for k, count in enumerate(counts))])
 
 
 def _words(branch: Branch, controls: Sequence[str]) -> list[dict[Any, str]]:
@@ -128,16 +166,6 @@ def answer(branch: Branch) -> str:
     return "center_height" if "pressure" in branch.hold else "pressure"
 
 
-def _coordinates(items: Sequence[Equilibrium | SpecialPoint], quantities: Sequence[str]) -> Array:
-    return np.array([[_value(item, q) for q in quantities] for item in items], dtype=float).reshape(-1, len(quantities))
-
-
-def _value(item: Equilibrium | SpecialPoint, quantity: str) -> float:
-    if "." not in quantity:
-        return float(getattr(item, quantity))
-    return (item.equilibrium if isinstance(item, SpecialPoint) else item).number(quantity)
-
-
 def _label(name: str, units: Units) -> str:
     """The text at an axis that shows a quantity, or a number of the scene, which is shown as the scene has it."""
     return key_label(name) if "." in name else axis_label(name, units)
@@ -148,14 +176,8 @@ def _factor(name: str, units: Units) -> float:
     return 1.0 if "." in name else units.factor(name)
 
 
-#: the special points between two neighbouring equilibria, in order: the verdicts that can change there (None: any) and their places in
-#: the picture; a snap is the last
-_Gap = list[tuple[tuple[Any, ...] | None, Array]]
-_SNAP = ("snap",)
-
-
 def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:
-    """The verdicts that can change at a special point, by control or number of waves. Over a number what is held decides."""
+    """The verdicts that can change at a special point, by control or number of waves; None for any. Over a number what is held decides."""
     of_kind: dict[str, tuple[Any, ...]] = {
         "limit_point": () if branch.over else ("pressure",),
         "volume_fold": () if branch.over else ("volume",),
@@ -166,83 +188,108 @@ def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:
     return of_kind.get(str(point.kind))
 
 
-def _gaps(branch: Branch, shown: _Shown) -> list[_Gap]:
-    """What lies between each pair of neighbours.
-
-    A special point lies between the two neighbours for which the way over it is the smallest detour, in volume, pressure and pole height
-    together (in a picture of two of them the branch may cross itself); one that is far from the points shown lies between none.
-    """
-    known = (*PLACES, branch.over) if branch.over else PLACES
-    points, special = _coordinates(branch, known), list(branch.special_points or ())
-    scale = np.maximum(np.ptp(points, axis=0), 1e-300) if len(points) else 1.0
-    a, b = points[:-1] / scale, points[1:] / scale
-    direct = np.linalg.norm(b - a, axis=1)
-    inside: list[list[tuple[float, SpecialPoint, Array]]] = [[] for _ in direct]
-    places, pictured = _coordinates(special, known) / scale, shown.at(special)
-    for item, place, drawn in zip(special, places, pictured, strict=True):
-        detour = np.linalg.norm(place - a, axis=1) + np.linalg.norm(place - b, axis=1) - direct
-        if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
-            inside[k].append((float((place - a[k]) @ (b[k] - a[k])), item, drawn))
-    ordered: list[_Gap] = [[(_changes(branch, item), drawn) for _, item, drawn in sorted(gap, key=lambda g: g[0])] for gap in inside]
-    for jump in branch.jumps:
-        for k, (before, landing) in enumerate(pairwise(branch)):
-            if landing is jump.landing:  # by way of the fold where the branch turned back
-                ordered[k] = [(_SNAP, shown.at([jump.limit or before])[0])]
-    return ordered
-
-
 @dataclass(frozen=True, eq=False)
 class _Segment:
-    """A straight piece of the drawn line, and the verdicts along it."""
+    """A piece of the drawn line, the verdicts along it, and whether the branch is known there."""
 
-    a: Array
-    b: Array
+    line: Array
     words: dict[Any, str]
+    known: bool = True
 
 
-def _segments(points: Array, words: Sequence[dict[Any, str]], gaps: Sequence[_Gap]) -> list[_Segment | None]:
-    """The pieces of the line, through the special points; None where the membrane snaps."""
+def _segments(shown: _Shown, words: Sequence[dict[Any, str]]) -> list[_Segment | None]:
+    """The pieces of the line, cut at special points; None where the membrane snaps."""
     pieces: list[_Segment | None] = []
-    for k, gap in enumerate(gaps):
-        at, now, after, end = points[k], words[k], words[k + 1], points[k + 1]
-        for changes, place in gap:
-            pieces.append(_Segment(at, place, now))
-            at, now = place, {c: after[c] if changes is None or c in changes else word for c, word in now.items()}
-        if gap and gap[-1][0] is _SNAP:
-            pieces.append(None)
-            continue
-        if now != after:  # somewhere here
-            pieces.append(_Segment(at, (at + end) / 2, now))
-            at = (at + end) / 2
-        pieces.append(_Segment(at, end, after))
+    for k, gap in enumerate(shown.curve.gaps):
+        now, after = words[k], words[k + 1]
+        *passed, last = gap.stretches
+        for stretch in passed:
+            pieces += _pieces(shown, stretch, now)
+            point = stretch[-1].b.special
+            changes = None if point is None else _changes(shown.curve.branch, point)
+            now = {c: after[c] if changes is None or c in changes else word for c, word in now.items()}
+        if gap.snap is not None:
+            pieces += [*_pieces(shown, last, now), None, *_pieces(shown, gap.beyond, after)]
+        else:
+            pieces += _pieces(shown, last, now) if now == after else _changing(shown, last, now, after)
     return pieces
 
 
-def _lines(pieces: Sequence[_Segment | None], classify: Callable[[dict[Any, str]], Any]) -> Iterator[tuple[Any, Array]]:
+def _pieces(shown: _Shown, part: Sequence[Piece], words: dict[Any, str]) -> list[_Segment | None]:
+    """A stretch of the curve with the same verdicts."""
+    return [_Segment(shown.line(list(group)), words, known) for known, group in groupby(part, lambda piece: piece.resolved)]
+
+
+def _changing(shown: _Shown, part: Sequence[Piece], now: dict[Any, str], after: dict[Any, str]) -> list[_Segment | None]:
+    """A stretch of the curve on which verdicts change.
+
+    Where the branch is not known they change there. Else the verdict at a held pressure or volume changes where the curve turns back in
+    it. Any other one changes half-way, and so does every one over a number, where what turns back is the number.
+    """
+    if not part:
+        return []
+    lost = next((k for k, piece in enumerate(part) if not piece.resolved), None)
+    if lost is not None and len(part) > 1:
+        inner = _changing(shown, part[lost : lost + 1], now, after)
+        return [*_pieces(shown, part[:lost], now), *inner, *_pieces(shown, part[lost + 1 :], after)]
+    places: dict[float, dict[Any, str]] = {}
+    for c in now:
+        if now[c] != after[c]:
+            turn = turning(part, c) if c in PLACES and not shown.curve.branch.over else None
+            places.setdefault(half_way(part) if turn is None else turn, {})[c] = after[c]
+    at, line = shown.parameters(part), shown.line(part)
+    found: list[_Segment | None] = []
+    for place in sorted(places):
+        cut = np.array([[np.interp(place, at, coordinate) for coordinate in line.T]])
+        before = at < place
+        found.append(_Segment(np.concatenate([line[before], cut]), now, lost is None))
+        now = now | places[place]
+        at, line = np.concatenate([[place], at[at > place]]), np.concatenate([cut, line[at > place]])
+    return [*found, _Segment(line, now, lost is None)]
+
+
+def _lines(pieces: Sequence[_Segment | None], classify: Callable[[_Segment], Any]) -> Iterator[tuple[Any, Array]]:
     """The pieces of one class that follow each other, as lines: no gap, no overlap."""
     kind: Any = None
     line: list[Array] = []
     for piece in [*pieces, None]:
-        new = None if piece is None else classify(piece.words)
+        new = None if piece is None else classify(piece)
         if line and (piece is None or new != kind):
-            yield kind, np.array(line)
+            yield kind, np.concatenate([line[0], *(part[1:] for part in line[1:])])
             line = []
         if piece is not None:
-            line = [*(line or [piece.a]), piece.b]
+            line.append(piece.line)
         kind = new
 
 
-def _draw_lines(axes: Axes, pieces: Sequence[_Segment | None], classify: Callable[[dict[Any, str]], Style]) -> None:
-    for style, line in _lines(pieces, classify):
+def _named(axes: Axes, label: str, heading: str | None) -> str:
+    """The colour of the next branch among several, which the legend then has under its name, and a heading for verdicts below."""
+    before = [line for line in axes.lines if line.get_gid() == _BRANCH]
+    color = COLORS[len(before) % len(COLORS)]
+    axes.plot([], [], color=color, linewidth=3.0, label=label, gid=_BRANCH)
+    if heading is not None:
+        axes.plot([], [], " ", label=new_label(axes, heading))
+    return color
+
+
+def _draw_lines(
+    axes: Axes, pieces: Sequence[_Segment | None], classify: Callable[[dict[Any, str]], Style], color: str | None = None
+) -> None:
+    for style, line in _lines(pieces, lambda piece: classify(piece.words) if piece.known else UNRESOLVED):
         # the caps of neighbouring dashes may not run into each other
-        look = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
-        axes.plot(*line.T, label=new_label(axes, style.label), zorder=3, **look)
+        look: dict[str, Any] = {"linestyle": style.dashes, "color": style.color, "linewidth": style.width, "dash_capstyle": "butt"}
+        if color is None:
+            axes.plot(*line.T, label=new_label(axes, style.label), zorder=3, **look)
+        else:  # the colour tells the branch: the verdicts of all branches are named once, in black
+            faint = {"alpha": 0.5} if style is UNTESTED else {}
+            axes.plot([], [], label=new_label(axes, style.label), **(look | {"color": "black"} | faint))
+            axes.plot(*line.T, zorder=3, **(look | {"color": color} | faint))
 
 
-def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
+def _draw_azimuthal(axes: Axes, branch: Branch, shown: _Shown) -> None:
     """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them, and for shorter waves."""
     words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
-    lines = list(_lines(_segments(points, words, gaps), lambda w: tuple(n for n, word in w.items() if word == "unstable")))
+    lines = list(_lines(_segments(shown, words), lambda p: tuple(n for n, word in p.words.items() if word == "unstable")))
     order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), lost))
     for lost, line in lines:
         if lost:
@@ -251,21 +298,20 @@ def _draw_azimuthal(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_G
             axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=named)
 
 
-def _draw_wrinkling(axes: Axes, branch: Branch, points: Array, gaps: Sequence[_Gap]) -> None:
+def _draw_wrinkling(axes: Axes, branch: Branch, shown: _Shown) -> None:
     """Patterns behind the stretches on which the membrane is wrinkled somewhere."""
     words: list[dict[Any, str]] = [{kind: kind * (kind in shown_kinds(e.zones())) for kind in PATTERNS} for e in branch]
-    for kinds, line in _lines(_segments(points, words, gaps), lambda w: tuple(filter(None, w.values()))):
+    for kinds, line in _lines(_segments(shown, words), lambda p: tuple(filter(None, p.words.values()))):
         for kind in kinds:
             draw_along(axes, line, kind, zone_label(branch.scene, kind), BRANCH_WIDTH)
 
 
-def _draw_jumps(axes: Axes, branch: Branch, shown: _Shown) -> None:
-    """An arrow for each snap, from the fold where the branch turned back, or from the equilibrium before."""
-    before = {id(landing): previous for previous, landing in pairwise(branch)}
+def _draw_jumps(axes: Axes, shown: _Shown) -> None:
+    """An arrow for each snap at the load where it happens."""
     arrow = {"arrowstyle": "-|>", "color": RED, "linewidth": 1.6, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0}
-    for jump in branch.jumps:
-        if id(jump.landing) in before:
-            tail, tip = shown.at([jump.limit or before[id(jump.landing)], jump.landing])
+    for gap in shown.curve.gaps:
+        if gap.snap is not None:
+            tail, tip = shown.ends(gap.snap)
             axes.annotate("", xy=tip, xytext=tail, arrowprops=arrow, zorder=4)
             axes.plot([], [], color=RED, linewidth=1.6, label=new_label(axes, "snap"))
 

@@ -6,8 +6,10 @@ the figures read the same in grey.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from os import PathLike
 from pathlib import Path
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
 
 _DPI = 160
+_LIVE_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42}
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,10 @@ class Style:
 SOLID, DASHED, DOTTED = "-", (0, (5, 2)), (0, (1, 1.4))
 BLUE, ORANGE, BLACK, RED = "#0072b2", "#d55e00", "#222222", "#a01040"
 PLAIN = Style("", SOLID, BLUE)
+#: a branch whose stability nobody asked for
+UNTESTED = Style("stability not tested", SOLID, "0.62", 1.8)
+#: between two equilibria that no curve was found for
+UNRESOLVED = Style("not resolved between steps", (0, (1, 3)), "0.5", 1.2)
 MARGINAL = Style("marginal (an eigenvalue is zero)", (0, (6, 1.5, 1, 1.5)), BLACK)
 BOTH = Style("stable under both controls", SOLID, BLUE)
 VOLUME_ONLY = Style("stable under volume control only", DASHED, ORANGE)
@@ -53,6 +60,8 @@ UNSTABLE_UNDER = {c: Style(f"unstable under {c} control", DOTTED, BLACK, 2.2) fo
 _ALL, _NONE = replace(BOTH, label="stable under all three controls"), replace(UNSTABLE, label="unstable under all three controls")
 _TWO_OF_THREE = (0, (5, 2, 1, 2, 1, 2))
 
+#: what verdicts under a control are about, above them in a legend
+AMONG = "among axisymmetric shapes:"
 #: in place of a verdict
 ILL_POSED_WORD = "ill-posed"
 
@@ -65,7 +74,7 @@ def verdict_style(equilibrium: Equilibrium, controls: Sequence[str] = ("pressure
 def style_of(words: Mapping[str, str]) -> Style:
     """The style of a class of equilibria: the verdict under each control asked for."""
     if not words:
-        return PLAIN
+        return UNTESTED
     if ILL_POSED_WORD in words.values():
         return ILL_POSED
     if "marginal" in words.values():
@@ -98,13 +107,50 @@ def _stable_under_some(controls: Sequence[str]) -> Style:
 _PAIRS = tuple(combinations(STABLE_UNDER, 2))
 #: the order of the lines in a legend
 _ORDER = [
-    style.label
-    for style in (
-        *(BOTH, _ALL, *(_under_pair(BOTH, pair) for pair in _PAIRS), *STABLE_UNDER.values()),
-        *(_stable_under_some(some) for some in (*_PAIRS, *combinations(STABLE_UNDER, 1))),
-        *(*UNSTABLE_UNDER.values(), *(_under_pair(UNSTABLE, pair) for pair in _PAIRS), UNSTABLE, _NONE, MARGINAL, ILL_POSED),
-    )
+    AMONG,
+    *(
+        style.label
+        for style in (
+            *(BOTH, _ALL, *(_under_pair(BOTH, pair) for pair in _PAIRS), *STABLE_UNDER.values()),
+            *(_stable_under_some(some) for some in (*_PAIRS, *combinations(STABLE_UNDER, 1))),
+            *(
+                *UNSTABLE_UNDER.values(),
+                *(_under_pair(UNSTABLE, pair) for pair in _PAIRS),
+                UNSTABLE,
+                _NONE,
+                MARGINAL,
+                ILL_POSED,
+                UNTESTED,
+                UNRESOLVED,
+            ),
+        )
+    ),
 ]
+
+
+def shown_figure(size: tuple[float, float]) -> Figure:
+    """An empty figure of a size in inches, which a notebook shows as a picture wherever it is the last value of a cell."""
+    load()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    show_in_notebooks(figure, figure)
+    return figure
+
+
+def show_in_notebooks(shown: Any, figure: Figure) -> None:
+    """Let a notebook show a figure, or axes of it, as a picture: without pyplot it would print their names."""
+    shown._repr_png_ = partial(png, figure)
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as the content of a PNG file for a screen."""
+    file = io.BytesIO()
+    with drawing():
+        figure.savefig(file, format="png", dpi=110)
+    return file.getvalue()
 
 
 def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[float] = (1.0,)) -> tuple[Figure, Any]:
@@ -115,12 +161,7 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
     figure : Figure
     axes : Axes, or array of Axes
     """
-    load()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = shown_figure(size)
     row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
     for axes in row:
         axes.spines[["top", "right"]].set_visible(False)
@@ -133,15 +174,25 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
 
 
 def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
-    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes."""
+    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes.
+
+    Text in SVG and PDF files stays text, which programs for drawing can edit.
+    """
     if path is not None:
         formats = figure.canvas.get_supported_filetypes()
         if Path(path).suffix[1:].lower() not in formats:
             raise InputError(
                 "path", str(path), "a name that ends in one of these is needed: " + ", ".join(f".{f}" for f in sorted(formats))
             )
-        with replace_file(path) as temporary, drawing():
-            figure.savefig(temporary, dpi=_DPI)
+        from matplotlib import rc_context
+
+        with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT):
+            try:
+                figure.savefig(temporary, dpi=_DPI)
+            except (RuntimeError, FileNotFoundError) as error:
+                if Path(path).suffix.lower() != ".pgf":
+                    raise
+                raise InputError("path", str(path), "LaTeX is needed for PGF (xelatex on the search path)") from error
     return figure
 
 
@@ -155,7 +206,13 @@ def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
 
 
 def legend_entries(axes: Axes) -> tuple[list[Any], list[str]]:
-    """Handles and labels of what is named, the verdicts first, then wrinkles, and these always in the same order."""
+    """Handles and labels of what is named: branches, verdicts, wrinkles, and whatever else, always in the same order."""
     named = list(zip(*axes.get_legend_handles_labels(), strict=True))
-    named.sort(key=lambda item: _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER) + zone_order(item[1]))
+
+    def place(item: tuple[Any, str]) -> int:
+        if item[0].get_gid() is not None:
+            return -1
+        return _ORDER.index(item[1]) if item[1] in _ORDER else len(_ORDER) + zone_order(item[1])
+
+    named.sort(key=place)
     return [handle for handle, _ in named], [label for _, label in named]

@@ -1,23 +1,34 @@
-"""Equilibria and branches as a notebook shows them."""
+"""Records as a notebook shows them."""
 
 from __future__ import annotations
 
 import base64
-import io
 from html import escape
-from typing import TYPE_CHECKING
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
 
+from ..errors import InputError
+from ..quantities import PLACES, title, words
+from ..results.error_estimate import ESTIMATED
+from ..results.folds import FOLD_NAMES
 from . import plots
-from .backend import drawing
+from .branch_lines import COLORS
+from .figures import png
 from .html import branch_rows, equilibrium_pairs, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..results.branch import Branch
+    from ..results.equilibria import Equilibria
     from ..results.equilibrium import Equilibrium
+    from ..results.error_estimate import ErrorEstimate
+    from ..results.folds import FoldCurve
+    from ..results.zones import Zones
 
 _ROWS = 12
+#: line styles that tell meridians apart in grey
+DASHES = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)))
 _SIDE_BY_SIDE = "display:flex;flex-wrap:wrap;gap:24px;align-items:center"
 
 
@@ -43,10 +54,60 @@ def equilibrium_html(equilibrium: Equilibrium) -> str:
     return f'<div style="{_SIDE_BY_SIDE}">{_picture(figure, "Deformed meridian")}{known}</div>'
 
 
+def zones_html(zones: Zones) -> str:
+    """A table with a row for each zone."""
+    header = ["zone", "r from", "r to", "ρ from", "ρ to", "part of the area", "of the deformed area"]  # noqa: RUF001
+    rows = [[z.kind, *z.r, *z.rho, z.area_fraction, z.deformed_area_fraction] for z in zones]
+    return table(header, rows, caption=f"Zones by the signs of the {zones.criterion} stresses, from the pole to the rim")
+
+
+def equilibria_html(found: Equilibria) -> str:
+    """The meridians of the equilibria beside a table of them."""
+    if not len(found):
+        return f"<p>{escape(str(found).splitlines()[0])}</p>"
+    figure, axes = plots.new_figure((4.6, 4.4))
+    for k, (equilibrium, color) in enumerate(zip(found, cycle(COLORS), strict=False)):
+        plots.draw_profile(axes, equilibrium, plots.Style(str(k), DASHES[k % len(DASHES)], color))
+    plots.draw_surroundings(axes, list(found))
+    handles, labels = plots.legend_entries(axes)
+    figure.legend(handles, labels, loc="outside lower left", frameon=False, fontsize=9, ncols=2, handlelength=3.2)
+    header = ["", title("energy"), *map(title, PLACES), "pressure held", "volume held"]
+    rows = [
+        [k, energy, *(getattr(e, name) for name in PLACES), e.verdict("pressure").word, e.verdict("volume").word]
+        for k, (energy, e) in enumerate(zip(found.energies, found, strict=True))
+    ]
+    known = table(header, rows, caption=f"{len(found)} equilibria at {found.control} {found.load:.9g}")
+    return f'<div style="{_SIDE_BY_SIDE}">{_picture(figure, "Deformed meridians")}{known}</div><p>{escape(found.searched)}</p>'
+
+
+def fold_curve_html(curve: FoldCurve) -> str:
+    """Pressure and volume of the fold over the number, and how the curve ended."""
+    if not len(curve):
+        return f"<p>{escape(curve.message or str(curve.status))}</p>"
+    rows = [[c.kind.replace("_", " "), c.value, c.pressure, c.volume] for c in curve.cusps]
+    cusps = table(["", curve.parameter, title("pressure"), title("volume")], rows) if rows else ""
+    message = f"<p>{escape(curve.message)}</p>" if curve.message else ""
+    return _picture(curve.plot(), f"{FOLD_NAMES[curve.kind]} over {curve.parameter}") + cusps + message
+
+
+def error_estimate_html(estimate: ErrorEstimate) -> str:
+    """A table of values and their errors."""
+    rows = [[words(name), d.value, d.error, d.relative] for name in ESTIMATED for d in [getattr(estimate, name)]]
+    caption = f"Errors at the same {words(estimate.control)}; {estimate.method}"
+    reason = f"<p>{escape(estimate.reason)}</p>" if estimate.reason else ""
+    return table(["", "value", "error", "relative"], rows, caption=caption) + reason
+
+
+def study_html(study: Any, label: str) -> str:
+    """The picture of a study above the text that is printed of it, or the text alone where there is nothing to draw."""
+    try:
+        picture = _picture(study.plot(), label)
+    except InputError:
+        picture = ""
+    return f"{picture}<pre>{escape(str(study))}</pre>"
+
+
 def _picture(figure: Figure, label: str) -> str:
     """A PNG in the page: notebooks put many pages into one, where the ids of SVGs would meet."""
-    file = io.BytesIO()
-    with drawing():
-        figure.savefig(file, format="png", dpi=110)
-    data = base64.b64encode(file.getvalue()).decode()
+    data = base64.b64encode(png(figure)).decode()
     return f'<img alt="{escape(label)}" style="max-width:min(100%, 560px)" src="data:image/png;base64,{data}"/>'

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..quantities import Units, axis_label, caption
 from .branch_lines import MARKERS, answer, draw_branch
 from .figures import (
+    AMONG,
     BOTH,
     MARGINAL,
     PLAIN,
@@ -26,6 +27,7 @@ from .figures import (
     legend_entries,
     new_figure,
     save_figure,
+    show_in_notebooks,
     verdict_style,
 )
 from .meridians import draw_profile, draw_surroundings
@@ -53,6 +55,7 @@ __all__ = [
     "draw_zones",
     "legend_entries",
     "new_figure",
+    "plot_branch",
     "plot_pressure_volume",
     "plot_profiles",
     "plot_zones",
@@ -83,8 +86,43 @@ def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.6), title=branch.scene.title)
     draw_branch(axes, branch, across=branch.over or "volume", up=answer(branch), units=units)
-    draw_legend(axes, "among axisymmetric shapes:" if branch.scene.analysis.stability else None)
+    draw_legend(axes, _heading(branch))
     return save_figure(figure, path)
+
+
+def plot_branch(
+    branch: Branch,
+    path: str | PathLike[str] | None = None,
+    *,
+    ax: Axes | None = None,
+    x: str | None = None,
+    y: str | None = None,
+    label: str | None = None,
+    units: str = "scaled",
+) -> Axes:
+    """One quantity of a branch against another, on axes of its own or onto given ones; see :meth:`.Branch.plot`.
+
+    Raises
+    ------
+    InputError
+        For an empty branch, an unknown quantity, a file that cannot be written, or SI units of a scene without scales.
+    """
+    _require_equilibria(branch)
+    if ax is None:
+        figure, ax = new_figure((6.4, 4.6), title=branch.scene.title if label is None else "")
+        show_in_notebooks(ax, figure)
+    across = (branch.over or "volume") if x is None else x
+    draw_branch(ax, branch, across=across, up=answer(branch) if y is None else y, label=label, units=units)
+    draw_legend(ax, _heading(branch) if label is None else None)
+    whole = ax.get_figure(root=True)
+    if whole is not None:
+        save_figure(whole, path)
+    return ax
+
+
+def _heading(branch: Branch) -> str | None:
+    """Verdicts under a control are about axisymmetric shapes alone."""
+    return AMONG if branch.scene.analysis.stability else None
 
 
 def plot_profiles(

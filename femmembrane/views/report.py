@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 #: inches: text is of a readable size in a column of a screen and on a phone
 _WIDTH, _HEIGHT = 4.7, 3.9
 _CURVES = 6
+#: least range of an axis relative to the values on it
+_LEAST_RANGE = 0.01
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)))
 _COLORS = ("#0072b2", "#d55e00", "#222222", "#a01040")
 
@@ -159,7 +161,21 @@ class _Page:
             plots.draw_branch(axes, self.branch, across=across, up=up, units=self.system)
             _legend_below(figure, axes)
             figures.append(self._figure(figure, f"{words(up).capitalize()} against {words(across)}"))
-        return _beside(*figures) + self._special_points() + self._jumps()
+        return _beside(*figures) + self._between() + self._special_points() + self._jumps()
+
+    def _between(self) -> str:
+        """What the curves show between the equilibria."""
+        curve = self.branch.curve
+        lost = sum(not piece.resolved for run in curve.runs for piece in run)
+        parts = ["Curves go through the equilibria along the tangents of the branch"]
+        if self.branch.over:
+            parts = ["Curves go smoothly through the equilibria; what lies between was not computed"]
+        if curve.added:
+            parts.append(f"and through {curve.added} more equilibria that were computed for the drawing alone")
+        said = " ".join(parts) + "."
+        if lost:
+            said += f" Steps are too long in {lost} place(s): what lies between is not known, and drawn as a straight line."
+        return f"<p>{escape(said)}</p>" if len(self.branch) > 1 else ""
 
     def _special_points(self) -> str:
         points = self.branch.special_points
@@ -299,8 +315,17 @@ def _along(equilibrium: Equilibrium, names: tuple[str, ...], units: Units) -> Fi
     axes.grid(color="0.9", linewidth=0.6)
     if profile[names[0]].min() < 0 or min(profile[name].min() for name in names) < 0:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
+    _show_even_as_even(axes)
     _legend_below(figure, axes)
     return figure
+
+
+def _show_even_as_even(axes: Any) -> None:
+    """A scale of at least one hundredth of the values, in which what is uniform but for errors of the mesh is level."""
+    low, high = axes.get_ylim()
+    half = _LEAST_RANGE / 2 * max(abs(low), abs(high))
+    if high - low < 2 * half:
+        axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
 
 
 def _figure_of(figure: Curves | Drawing, branch: Branch) -> Figure:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -31,6 +32,8 @@ SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
 #: most frames of a movie of a branch, and frames of one period of a mode
 _MOST, _PERIOD = 90, 30
 _RATE = 12.0
+#: characters of a line of a caption
+_LINE = 72
 #: seconds for which the last step of a branch stays; milliseconds between two phases of a mode in a window
 _HOLD, _PAUSE = 1.5, 50
 
@@ -163,7 +166,8 @@ def _frame(plotter: pyvista.Plotter) -> Frame:
 def write_caption(plotter: pyvista.Plotter, text: str) -> None:
     """Lines at the upper left, in place of those before."""
     width, height = plotter.window_size
-    plotter.add_text(text, position=(0.03 * width, 0.9 * height), font_size=11 * height / 720, color="black", name="caption", render=False)
+    low = 0.9 - 0.035 * max(text.count("\n") - 1, 0)  # the first line stays where it is
+    plotter.add_text(text, position=(0.03 * width, low * height), font_size=11 * height / 720, color="black", name="caption", render=False)
 
 
 def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units = SCALED) -> str:
@@ -171,7 +175,7 @@ def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units = S
     numbers = f"{caption(equilibrium.volume, equilibrium.pressure, '   ', units)}   {height.rstrip()}"
     answers = [remark.caption for remark in remarks(equilibrium) if remark.caption]
     step = f"step {number}/{total - 1}   " if total > 1 else ""
-    return "\n".join(line for line in (step + numbers, ", ".join(answers)) if line)
+    return "\n".join([step + numbers, *textwrap.wrap(", ".join(answers), _LINE)])
 
 
 def _view_mode(

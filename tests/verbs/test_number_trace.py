@@ -80,7 +80,7 @@ def test_the_number_is_a_column_of_tables_and_files(tmp_path: Path) -> None:
     assert [p.equilibrium.scene for p in again.special_points or ()] == [p.equilibrium.scene for p in branch.special_points or ()]
     assert list(branch.to_dataframe().columns)[:3] == ["step", HEIGHT, "volume"]
     assert HEIGHT in str(branch).splitlines()[0]
-    (axes,) = again.plot().axes
+    axes = again.plot()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("height of the source h/R₀", "pole height η(0)/R₀")
     assert "limit point in the number" in [text.get_text() for text in axes.get_legend().get_texts()]
 

@@ -173,3 +173,23 @@ def test_bad_arguments_are_named(arguments, key):
     with pytest.raises(fm.InputError) as raised:
         fm.trace(disc_scene(OGDEN, elements=4), **arguments)
     assert raised.value.key == key
+
+
+def test_a_trace_that_sets_out_the_wrong_way_says_so():
+    """It left the volume that it was to end at behind; the advice is right."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8))
+    wrong = fm.trace(scene, start=1.0, until={"volume": 0.5}, max_steps=5, special_points=False)
+    assert "it set out from volume 1, away from 0.5: direction = -1 sets out the other way" in wrong.message
+    right = fm.trace(scene, start=1.0, until={"volume": 0.5}, max_steps=50, special_points=False, direction=-1)
+    assert (right.status, right[-1].volume) == (fm.Status.CONVERGED, pytest.approx(0.5, rel=1e-12))
+    short = fm.trace(scene, start=1.0, until={"volume": 50.0}, max_steps=5, special_points=False)
+    assert "direction" not in short.message
+
+
+def test_an_equilibrium_beyond_the_limit_point_names_it():
+    """As a run by pressures does. The limit point of the neo-Hookean disc is P = 1.8786 (reference/disc.json: 1.8792 with 16 elements)."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16))
+    limit = fm.trace(scene, start=2.0, until={"volume": 4.0}).special_points[0]
+    for pressure in (5.0, -5.0):
+        with pytest.raises(fm.SolveError, match=f"the limit point is P = {np.copysign(limit.pressure, pressure):.6g}"):
+            fm.equilibrium(scene, pressure=pressure)

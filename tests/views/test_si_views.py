@@ -45,7 +45,7 @@ def test_units_by_hand():
 
 def test_the_line_of_a_plot_has_the_numbers_of_its_labels():
     """Measured points in these units can be drawn over it."""
-    scaled, si = branch().plot().axes[0], branch().plot(units="si").axes[0]
+    scaled, si = branch().plot(), branch().plot(units="si")
     assert (si.get_xlabel(), si.get_ylabel()) == ("volume V in ml", "pressure p in kPa")
     lines = [(one.get_xydata(), other.get_xydata()) for one, other in zip(scaled.lines, si.lines, strict=True)]
     assert lines

@@ -87,10 +87,12 @@ class Verdicts(EquilibriumAnalysis):
     # --- words and pages
 
     def remarks(self, equilibrium: Equilibrium) -> Iterator[Remark]:
-        for p in equilibrium.scene.analysis.verdicts:
+        """A caption has all verdicts. That perturbations are axisymmetric is said where no others were looked at."""
+        asked = equilibrium.scene.analysis
+        for k, p in enumerate(asked.verdicts):
             verdict = _verdict(equilibrium, p)
-            caption = "" if p.azimuthal else f"{verdict.word} {p.against}"
-            yield Remark(p.against, verdict.reason, f"{p.brief}: {verdict.word}", caption)
+            about = p.against if asked.azimuthal_modes else ("" if k else "against axisymmetric perturbations ") + f"({p.held})"
+            yield Remark(p.against, verdict.reason, f"{p.brief}: {verdict.word}", f"{verdict.word} {about}")
 
     def printed(self, scene: Scene) -> Sequence[PrintedColumn]:
         """Of the controls that the scene asks for; of both where it asks for none."""

@@ -35,7 +35,7 @@ def test_amounts_of_gas_are_loads(tmp_path: Path) -> None:
         assert (again.column(name) == branch.column(name)).all()
     assert again.scene == asked
     assert "under gas" in str(branch)
-    (axes,) = branch.plot().axes
+    axes = branch.plot()
     assert "stable under pressure and gas control" in [text.get_text() for text in axes.get_legend().get_texts()]
 
 

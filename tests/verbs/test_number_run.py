@@ -66,7 +66,7 @@ def test_a_balloon_snaps_when_the_magnet_that_held_it_back_leaves_and_stays_when
     again = fm.load(tmp_path / "branch.nc")
     assert again.jumps[0].limit is not None
     assert again.jumps[0].limit.equilibrium.scene == jump.limit.equilibrium.scene
-    (axes,) = again.plot().axes
+    axes = again.plot()
     assert "snap" in [text.get_text() for text in axes.get_legend().get_texts()]
 
 

@@ -24,6 +24,7 @@ from .banded import negative_among
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, displaced
 from .state import displacement, distance
+from .wellposed import stress_free
 
 #: two states closer than this are the same, relative to the size of the displacement
 SAME = 1e-6
@@ -186,9 +187,12 @@ def _on_branch_of_guess(
 
 
 def is_minimum(potential: Potential, control: Control, evaluation: Evaluation) -> bool:
-    """Whether the second variation has no negative direction under volume or pressure control."""
+    """Whether the second variation has no negative direction under volume or pressure control.
+
+    Without stress nothing but round-off resists a deflection, which may have either sign; the energy is least there.
+    """
     constraint = evaluation.volume_gradient if isinstance(control, VolumeControl) else None
-    return negative_among(evaluation, constraint) == 0
+    return negative_among(evaluation, constraint) == 0 or stress_free(evaluation)
 
 
 @lru_cache(maxsize=32)

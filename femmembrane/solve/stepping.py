@@ -24,6 +24,8 @@ MAX_DEVIATION = 0.2
 MIN_STEP = 1e-4
 #: and so does one that is this small a part of the whole way
 ROUND_OFF = 1e-15
+#: displacement in units of the membrane's own size that is none: a flat sheet that is stretched stays where it is
+_NO_MOTION = 1e-16
 
 Corrector = Callable[..., NewtonResult]
 
@@ -84,7 +86,8 @@ def march(
         reach = distance(potential, x, accepted[-1].x)
         if (
             result.status is Status.CONVERGED
-            and distance(potential, result.x, x) <= MAX_DEVIATION * reach + 1e-9 * max(potential.largest(x)) / potential.space.unit
+            and distance(potential, result.x, x)
+            <= MAX_DEVIATION * reach + 1e-9 * max(potential.largest(x)) / potential.space.unit + _NO_MOTION
         ):
             new = State.of(result, spent - result.iterations)
             if _through_source(potential, accepted[-1], new, parameter):

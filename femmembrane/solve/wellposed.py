@@ -31,6 +31,8 @@ from .state import State
 
 #: stress relative to the largest one that counts as none
 NO_STRESS = 1e-8
+#: stress over the shear modulus that is round-off
+STRESS_FREE = 1e-14
 #: what is said of a compression or a slack zone that finer spaces could contradict
 UNCONFIRMED = "on this mesh; not confirmed, since the state was not found on finer elements"
 
@@ -109,6 +111,8 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:  # the usual case needs no scale
         return None
     scale = stress_scale(evaluation)
+    if not slack and scale <= STRESS_FREE:
+        return None
     if not scale and not potential.strained:  # the unloaded membrane is not slack but at rest, where its ends do not bring it closer
         return None
     r = potential.space.R.ravel()[unsupported(supporting(evaluation)[0], scale, slack) | (not scale)]
@@ -142,6 +146,11 @@ def supporting(evaluation: Evaluation) -> Array:
 def stress_scale(evaluation: Evaluation) -> float:
     """The largest stress of a state; with voltage or charge also that of Maxwell, with which the stress of the material may balance."""
     return evaluation.once("stress scale", _stress_scale)
+
+
+def stress_free(evaluation: Evaluation) -> bool:
+    """Whether nothing acts on a membrane, and no stress is left in it but round-off: its energy is zero, the least that there is."""
+    return not evaluation.potential.surrounded and stress_scale(evaluation) <= STRESS_FREE
 
 
 def _stress_scale(evaluation: Evaluation) -> float:
@@ -178,7 +187,7 @@ def compressed(potential: Potential, evaluation: Evaluation, component: int, str
 def least_stress(evaluation: Evaluation, component: int, stresses: Supporting = supporting) -> float:
     """The most compressive value of a principal stress (0 meridional, 1 hoop) on the mesh of a state; 0 where it is nowhere compressive."""
     least = float(stresses(evaluation)[component].min(initial=0.0))
-    if least >= 0:  # the usual case needs no scale
+    if least >= 0 or stress_scale(evaluation) <= STRESS_FREE:  # the usual case needs no scale
         return 0.0
     return least if unsupported(np.array(least), stress_scale(evaluation), False) else 0.0
 

@@ -24,7 +24,7 @@ from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_wav
 from .mode_resolution import unresolved, unresolved_stress
 from .second_variation import pairs_of
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
-from .verdict import against, short_wave_verdict, verdict_from
+from .verdict import against, short_wave_verdict, slack_all_over, slack_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
 
 
@@ -104,6 +104,8 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(np.asarray(x, dtype=float), pressure)
     wrinkles = short_waves(potential, evaluation)
+    if wrinkles and slack_all_over(evaluation):
+        return slack_verdict(None, operator.n)
     if wrinkles:
         where = "; ".join(wrinkle.where for wrinkle in wrinkles)
         return short_wave_verdict(where, any(wrinkle.confirmed for wrinkle in wrinkles), None, operator.n)

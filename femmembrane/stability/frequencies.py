@@ -21,6 +21,7 @@ from ..solve.wellposed import ill_posed
 from .azimuthal import lowest_eigenvalues, short_waves
 from .azimuthal_operator import azimuthal_operator
 from .spectrum import SpectrumError
+from .verdict import SLACK_ALL_OVER, slack_all_over
 from .wave_unknowns import azimuthal_shape
 
 
@@ -55,6 +56,8 @@ def natural_frequencies(
     bad = ill_posed(potential, evaluation)
     # a hoop stress sets no axisymmetric wave in motion
     wrinkles = [wrinkle.where for wrinkle in short_waves(potential, evaluation)] if operator.n else [str(bad)] if bad else []
+    if wrinkles and slack_all_over(evaluation):
+        raise SolveError(f"no natural frequencies: {SLACK_ALL_OVER}", status=Status.SLACK)
     if wrinkles:
         where = "; ".join(wrinkles)
         raise SolveError(f"no natural frequencies: short-wave unstable, {where}", status=bad.status if bad else Status.LEGENDRE_FAILURE)

@@ -12,12 +12,14 @@ from ..errors import InputError
 from ..physics.electric import Electric
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Shape, Verdict
-from ..solve.wellposed import apparent, ill_posed
+from ..solve.wellposed import apparent, ill_posed, stress_free
 from .mode_resolution import unresolved_axisymmetric
 from .rigid_motions import pencil_of
 from .spectrum import SmallestEigenvalue, smallest_of
 
 CONTROLS = ("pressure", "volume", "gas")
+#: what is said of a membrane without any tension
+SLACK_ALL_OVER = "the membrane is slack all over, its energy is zero, the least that there is, and its shape is not determined"
 
 
 def axisymmetric_verdict(
@@ -39,6 +41,8 @@ def axisymmetric_verdict(
     choice("control", control, CONTROLS)
     shown = apparent(potential, evaluation)
     bad = ill_posed(potential, evaluation) if shown else None
+    if bad is not None and slack_all_over(evaluation):
+        return slack_verdict(control, 0)
     if bad is not None:
         return short_wave_verdict(f"{bad}, and the spectrum has no lower bound under refinement", bad.confirmed, control, 0)
     if control == "gas" and compliance is None:
@@ -53,6 +57,16 @@ def axisymmetric_verdict(
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
+
+
+def slack_all_over(evaluation: Evaluation) -> bool:
+    """Whether a tension field carries no tension anywhere: many shapes have its relaxed energy then, which is the least."""
+    return evaluation.potential.scene.tension_field and stress_free(evaluation)
+
+
+def slack_verdict(control: str | None, n: int) -> Verdict:
+    """The verdict on a membrane that is slack all over."""
+    return Verdict(None, np.nan, np.nan, control, n, None, f"marginal: {SLACK_ALL_OVER}")
 
 
 def short_wave_verdict(where: str, confirmed: bool, control: str | None, n: int) -> Verdict:

@@ -490,6 +490,13 @@ def test_values_that_no_float_holds(quantity, value):
     assert scales.to_si(quantity, np.inf) == np.inf
 
 
+@pytest.mark.parametrize("text", ["1e400 Pa", "1e308 MPa"])
+def test_a_text_that_is_too_large_for_a_float_is_refused(text):
+    scales = fm.Scales(radius=0.05, thickness=1e-3, shear_modulus=1e5)
+    with pytest.raises(fm.InputError, match="a float can hold in Pa"):
+        scales.from_si("pressure", text)
+
+
 @pytest.mark.parametrize(("quantity", "value"), [("volume", 1e305), ("dipole_strength", 1e300)])
 def test_si_values_that_no_float_holds(quantity, value):
     with pytest.raises(InputError, match=r"^value = "):

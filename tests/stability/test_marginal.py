@@ -72,3 +72,18 @@ def test_gas_control_finds_its_own_pressure():
     assert eq.verdict("gas").control == "gas"
     with pytest.raises(fm.InputError, match="gas"):
         fm.equilibrium(scene, volume=1.0).verdict("gas")
+
+
+def test_a_tension_field_that_is_slack_all_over_is_marginal():
+    """Its relaxed energy, nowhere below zero, is zero there and for every other shape that is nowhere longer than the sheet."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=3, prestretch=0.9, tension_field=True)
+    eq = fm.equilibrium(scene, volume=0.2)
+    assert (eq.energy, eq.pressure) == (0.0, 0.0)
+    for verdict in (eq.verdict("volume"), eq.verdict("pressure"), eq.verdict(azimuthal=1), eq.verdict(azimuthal=2)):
+        assert verdict.stable is None
+        assert "slack all over" in verdict.reason
+        assert "its shape is not determined" in verdict.reason
+    for waves in (0, 1):
+        with pytest.raises(fm.SolveError, match="slack all over") as caught:
+            eq.frequencies(azimuthal=waves)
+        assert caught.value.status is fm.Status.SLACK

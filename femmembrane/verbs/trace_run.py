@@ -282,11 +282,12 @@ class TraceRun(Run[Branch]):
     def _went_away(self) -> str:
         """Advice for a branch that left all values behind at which it was to end; empty where it did not."""
         request, known = self.request, not isinstance(self.request.start, Branch)
-        ways = [(abs(getattr(eq, q) - v) for eq in (self.found[0], self.found[1], self.found[-1])) for q, v in request.targets.items()]
+        ways = [(abs(_place(eq, q) - v) for eq in (self.found[0], self.found[1], self.found[-1])) for q, v in request.targets.items()]
         if not (known and ways and all(first < second < last for first, second, last in ways)):
             return ""
         quantity, value = next(iter(request.targets.items()))
-        begun = f"it set out from {CONTROLS[quantity].words} {getattr(self.found[0], quantity):.6g}, away from {value:.6g}"
+        words = CONTROLS[quantity].words if quantity in CONTROLS else quantity
+        begun = f"it set out from {words} {_place(self.found[0], quantity):.6g}, away from {value:.6g}"
         return f"{begun}: direction = {-request.direction} sets out the other way"
 
     def _explained(self, status: Status, message: str) -> End:
@@ -422,3 +423,10 @@ class TraceRun(Run[Branch]):
         special = None if self.special is None else tuple(self.special)
         known = tuple(self.found) if found is None else found
         return Branch(self.scene, known, status, message, dict(self.timings), special, memory, solver="newton")
+
+
+def _place(equilibrium: Equilibrium, quantity: str) -> float:
+    """A quantity or a number of the scene in an equilibrium; NaN for an amount of gas, which it knows by its chamber alone."""
+    if "." in quantity:
+        return equilibrium.number(quantity)
+    return float(getattr(equilibrium, quantity)) if quantity in CONTROLS else float("nan")

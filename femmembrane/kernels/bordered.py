@@ -40,10 +40,11 @@ class BorderedFactor:
         return float(self._delta_v)
 
     def solve(self, f: Array, g: float) -> tuple[Array, float]:
-        first = (g - self._v @ f) / self._delta_v
-        rest = self._factor.solve(f - first * self._column)
-        second = (g - self._corner * first - self._row @ rest) / self._delta_w
-        return rest - second * self._w, float(first + second)
+        with np.errstate(all="ignore"):  # where the bordered matrix is singular too the answer is NaN, which the caller judges
+            first = (g - self._v @ f) / self._delta_v
+            rest = self._factor.solve(f - first * self._column)
+            second = (g - self._corner * first - self._row @ rest) / self._delta_w
+            return rest - second * self._w, float(first + second)
 
 
 class SpringFactor:

@@ -24,6 +24,7 @@ NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
 _EPSILON = float(np.finfo(float).eps)
+_LEAST = float(np.finfo(float).tiny)
 #: pressure of a trial step from which on products are no numbers: the trial is refused
 _ABSURD = 1e150
 #: largest force of a correction of P, relative to the forces that meet at a node: a guess may have the right shape and a wrong P
@@ -271,7 +272,7 @@ def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
 def residuals_over(size: tuple[float, float], scales: tuple[float, float]) -> tuple[float, float]:
     """Out-of-balance forces along u and along w over the forces that meet at a node."""
     # a component without forces along it holds round-off of the other component
-    least = _EPSILON * max(scales)
+    least = max(_EPSILON * max(scales), _LEAST)  # a slack membrane has no forces at all: what is out of balance is then infinitely large
     (u, w), (scale_u, scale_w) = size, scales
     return u / max(scale_u, least) if u else 0.0, w / max(scale_w, least) if w else 0.0
 

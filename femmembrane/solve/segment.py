@@ -11,9 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic
 
+import numpy as np
 from scipy.optimize import brentq
 
-from ..errors import SolveError
+from ..errors import SolveError, Status
 from ..potential import Array
 from .continuation import CurveProblem, Followed, Point
 from .state import hermite
@@ -61,6 +62,8 @@ class Segment(Generic[Point]):
             a, b = self.a, self.b
             row = (1 - share) * a.dual + share * b.dual
             point = self.problem.resolve(self._predicted(share), row, a)
+            if not np.isfinite(point.tangent).all():  # nothing holds a membrane that is slack all over: the curve has no direction there
+                raise SolveError("the curve has no tangent between two neighbouring points", status=Status.NOT_CONVERGED)
             point.sigma = a.sigma + share * self.length
             self._known[share] = point
         return self._known[share]

@@ -391,3 +391,14 @@ def test_an_absurd_trial_is_refused_in_silence() -> None:
     """Turning on the sources of this scene a step overshoots beyond what is a number; the step is halved, and no warning says so."""
     member = recorded()[363]
     assert fm.equilibrium(member.scene, center_height=member.center_height).status is fm.Status.CONVERGED
+
+
+@pytest.mark.parametrize("load", [{"pressure": -0.8880349361913269, "solver": "newton"}, {"center_height": 2.3391584172351694}], ids=str)
+def test_a_bowl_that_goes_slack_on_the_way_is_answered_or_refused_in_words(load: dict[str, Any]) -> None:
+    """Random scene 958: on the way a tension field loses all its tension, so that no force is left to compare with."""
+    scene = fm.Scene(material=fm.Gent(86.654), mesh=fm.cap(-1.60129, 34, rim="radial"), degree=2, tension_field=True)
+    try:
+        status = fm.equilibrium(scene, **load).status
+    except fm.SolveError as error:
+        status = error.status
+    assert status in (fm.Status.CONVERGED, fm.Status.SLACK, fm.Status.NO_EQUILIBRIUM, fm.Status.STEP_UNDERFLOW, fm.Status.NOT_CONVERGED)

@@ -16,8 +16,8 @@ from ..solve.controls import CONTROLS
 from ..solve.newton import correct
 from ..solve.state import State, joined
 from ..threads import one_thread
-from .curve import Array, BranchCurve, Piece, recorded
-from .equilibrium import Equilibrium
+from .curve import Array, BranchCurve, Piece
+from .equilibrium import Equilibrium, recorded
 
 if TYPE_CHECKING:
     from .branch import Branch

@@ -35,15 +35,14 @@ from ..solve.between import (
 )
 from ..solve.branch import BranchProblem
 from ..solve.controls import CONTROLS
-from ..solve.newton import relative_residual
 from ..solve.state import State, joined
 from ..solve.stepping import march
 from ..threads import one_thread
-from .equilibrium import Equilibrium
+from .equilibrium import Equilibrium, recorded
 from .special_point import Jump, SpecialPoint
 
 if TYPE_CHECKING:
-    from ..potential import Evaluation, Potential
+    from ..potential import Potential
     from ..scene import Scene
     from .branch import Branch
 
@@ -415,38 +414,6 @@ def specials_between(branch: Branch) -> list[list[SpecialPoint]]:
         if detour.size and detour[k := int(np.argmin(detour))] < direct[k]:
             inside[k].append((float((place - a[k]) @ (b[k] - a[k])), item))
     return [[item for _, item in sorted(gap, key=lambda g: g[0])] for gap in inside]
-
-
-def recorded(
-    scene: Scene,
-    potential: Potential,
-    x: Array,
-    pressure: float,
-    evaluation: Evaluation,
-    status: Status,
-    residual: float | None = None,
-    iterations: int = 0,
-) -> Equilibrium:
-    """The record of a state between two equilibria of a scene; its residual is found if it is not given."""
-    if residual is None:
-        force = evaluation.gradient - pressure * evaluation.volume_gradient
-        residual = relative_residual(potential, force, evaluation, pressure)
-    coefficients = x.copy()
-    coefficients.flags.writeable = False
-    return Equilibrium(
-        pressure=float(pressure),
-        volume=evaluation.volume,
-        center_height=potential.space.center_height(x),
-        elastic_energy=evaluation.elastic_energy,
-        magnetic_energy=evaluation.magnetic_energy,
-        residual=float(residual),
-        iterations=iterations,
-        status=status,
-        scene=scene,
-        state=coefficients,
-        load_energy=evaluation.load_energy,
-        electric_energy=evaluation.electric_energy,
-    )
 
 
 def _apart(chain: Sequence[tuple[_Place, CurvePoint]]) -> list[tuple[_Place, CurvePoint]]:

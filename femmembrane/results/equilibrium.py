@@ -15,11 +15,12 @@ from ..errors import InputError, Status
 from ..scene import WRINKLING
 from ..scene.variation import Parameter
 from ..solve.controls import control_kind
+from ..solve.newton import relative_residual
 from ..threads import one_thread
 from . import door
 
 if TYPE_CHECKING:
-    from ..potential import Potential
+    from ..potential import Evaluation, Potential
     from ..scene import Scene
     from ..solve.controls import Gas
     from .error_estimate import ErrorEstimate
@@ -365,3 +366,37 @@ def _places(r: ArrayLike, ends: Array, what: str) -> Array:
     if not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
         raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
     return np.clip(s, ends[0], ends[-1])
+
+
+def recorded(
+    scene: Scene,
+    potential: Potential,
+    x: Array,
+    pressure: float,
+    evaluation: Evaluation,
+    status: Status,
+    residual: float | None = None,
+    iterations: int = 0,
+    gas: Gas | None = None,
+) -> Equilibrium:
+    """The record of a state of a scene; its residual is found if it is not given. What is -0 is written as 0."""
+    if residual is None:
+        force = evaluation.gradient - pressure * evaluation.volume_gradient
+        residual = relative_residual(potential, force, evaluation, pressure)
+    coefficients = x.copy()
+    coefficients.flags.writeable = False
+    return Equilibrium(
+        pressure=float(pressure) + 0.0,
+        volume=evaluation.volume + 0.0,
+        center_height=potential.space.center_height(x) + 0.0,
+        elastic_energy=evaluation.elastic_energy,
+        magnetic_energy=evaluation.magnetic_energy,
+        residual=float(residual),
+        iterations=iterations,
+        status=status,
+        scene=scene,
+        state=coefficients,
+        load_energy=evaluation.load_energy,
+        electric_energy=evaluation.electric_energy,
+        gas=gas,
+    )

@@ -13,7 +13,7 @@ from ..errors import InputError, SolveError, Status
 from ..potential import Potential
 from ..results.analyses import asked
 from ..results.branch import Branch
-from ..results.equilibrium import Equilibrium
+from ..results.equilibrium import Equilibrium, recorded
 from ..results.path_memory import PathMemory
 from ..results.special_point import SpecialPoint
 from ..scene import Scene
@@ -90,23 +90,8 @@ def record(
     ``previous`` lends its modes as starting guesses; ``clock`` is the time at which work on this state began.
     """
     bad = ill_posed(potential, state.evaluation)
-    coefficients = state.x.copy()
-    coefficients.flags.writeable = False
-    equilibrium = Equilibrium(
-        pressure=float(state.pressure) + 0.0,  # 0, not -0
-        volume=state.evaluation.volume + 0.0,
-        center_height=potential.space.center_height(state.x) + 0.0,
-        elastic_energy=state.evaluation.elastic_energy,
-        magnetic_energy=state.evaluation.magnetic_energy,
-        residual=float(state.residual),
-        iterations=state.iterations,
-        status=state.status if bad is None else bad.status,
-        scene=scene,
-        state=coefficients,
-        load_energy=state.evaluation.load_energy,
-        electric_energy=state.evaluation.electric_energy,
-        gas=gas,
-    )
+    status = state.status if bad is None else bad.status
+    equilibrium = recorded(scene, potential, state.x, state.pressure, state.evaluation, status, state.residual, state.iterations, gas)
     for analysis in asked(scene):
         analysis.compute(equilibrium, previous, state.evaluation)
     if clock is not None:  # written last, for answers take time

@@ -11,6 +11,7 @@ from femmembrane.accuracy.shooting import Guess, shoot
 from femmembrane.potential import potential_of
 from femmembrane.solve.banded import band_product
 from femmembrane.solve.pull_in import moduli
+from femmembrane.views.report import report
 from tests.cases import OGDEN, effect
 
 DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=6)
@@ -307,6 +308,37 @@ def test_columns_and_files(tmp_path):
     assert again[1].electric_energy == branch[1].electric_energy
     assert again[1].charge == branch[1].charge
     assert not {"electric_energy", "voltage"} & set(fm.inflate(DISC, volumes=[1.0]).to_dataframe())
+    assert not {"voltage", "capacitance"} & set(fm.inflate(under(DISC, frozen_charge=0.2), volumes=[1.0]).to_dataframe())
+
+
+def test_columns_in_si_units(tmp_path):
+    """V, C, F and V/m where the scene has scales and a permittivity: Q = C U, and E = U over the thickness that is left."""
+    scene = DISC.replace(scales=fm.Scales(radius=0.05, thickness=5e-4, shear_modulus=45e3))
+    volts = under(scene, voltage=5e3, relative_permittivity=4.7, breakdown=5e7)
+    branch = fm.vary(volts, "electric.voltage", [5e3, 2.5e3, 0.0], hold={"volume": 1.0})
+    frame = branch.to_dataframe()
+    assert frame["voltage_v"].tolist() == pytest.approx([5e3, 2.5e3, 0.0])
+    np.testing.assert_allclose(frame["capacitance_f"], 8.8541878e-12 * 4.7 * 0.05**2 / 5e-4 * frame["capacitance"], rtol=1e-7)
+    np.testing.assert_allclose(frame["charge_c"], frame["voltage_v"] * frame["capacitance_f"], rtol=1e-12)
+    np.testing.assert_allclose(frame["breakdown_ratio"], frame["electric_field_v_per_m"] / 5e7, rtol=1e-12)
+    assert frame["electric_field_v_per_m"][0] == pytest.approx(frame["electric_field"][0] / frame["voltage"][0] * 5e3 / 5e-4, rel=1e-12)
+    assert frame["charge_c"][2] == frame["electric_field"][2] == frame["breakdown_ratio"][2] == 0
+    assert "charge in µC" in str(branch)
+    branch.save(tmp_path / "branch.nc")
+    again = fm.load(tmp_path / "branch.nc")
+    assert again.to_dataframe().equals(frame)
+    variables = branch.to_xarray()
+    assert (variables["voltage_v"].attrs["units"], variables["electric_field_v_per_m"].dims) == ("V", ("step",))
+    assert variables["electric_field_profile"].dims == ("step", "node")
+    assert branch[0].profile()["electric_field_v_per_m"].max() == pytest.approx(frame["electric_field_v_per_m"][0], rel=0.02)
+    axes = branch.plot(x="voltage", y="charge", units="si")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("voltage in kV", "charge in µC")
+    page = report(branch, units="si")
+    assert "Voltage and charge" in page
+    assert "0 of the breakdown field" in page
+    numbers = fm.inflate(under(scene, voltage=0.3), volumes=[1.0])  # without a permittivity nobody knows the volts
+    assert not {"voltage_v", "charge_c"} & set(numbers.to_dataframe())
+    assert numbers.plot(x="voltage", y="pressure", units="si").get_xlabel().startswith("voltage φ")
 
 
 def test_pulled_in():

@@ -183,8 +183,9 @@ class Family(Potential):
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
         if self.charged is not None:
-            allowed = "a voltage is allowed, whose folds are local: a total charge couples all points of the membrane"
-            raise InputError("electric.total_charge", self.charged.total, allowed)
+            return FoldDerivatives(
+                *self.charged.fold_derivatives(x, pressure, number, mode, q), self.number_derivative(x, pressure, number)
+            )
         space, ne = self.space, self.space.n_elements
         local = np.concatenate([space.at_quadrature(x), space.at_quadrature(mode)])
         out = self._fold_kernel(local, np.array([pressure, number, q]))

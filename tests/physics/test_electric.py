@@ -9,7 +9,11 @@ from scipy.special import jn_zeros
 import femmembrane as fm
 from femmembrane.accuracy.shooting import Guess, shoot
 from femmembrane.potential import potential_of
+from femmembrane.potential.family import Family
+from femmembrane.scene.variation import Parameter
 from femmembrane.solve.banded import band_product
+from femmembrane.solve.controls import PressureControl, VolumeControl
+from femmembrane.solve.minimize import minimize
 from femmembrane.solve.pull_in import moduli
 from femmembrane.views.report import report
 from tests.cases import OGDEN, effect
@@ -244,6 +248,63 @@ def test_fold_curve_over_the_voltage():
     assert len(curve) > 3
     stretch = np.cbrt(np.array(curve.volume) * 3 / (4 * np.pi))
     assert np.array(curve.values) ** 2 == pytest.approx(7 * stretch**-8 - stretch**-2, rel=1e-6)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_fold_curve_over_a_total_charge(direction):
+    """The limit point of a sphere over Q = 4 pi q: l^6 = 7 (1 + q^2), down to q = 0 and through q^2 = 3, where all pears are neutral."""
+    scene, limit = under(SPHERE, total_charge=4 * np.pi * 0.7), (7 * 1.49) ** (1 / 6)
+    branch = fm.trace(scene, start=ball(0.97 * limit), until={"volume": ball(1.03 * limit)})
+    (start,) = branch.special_points
+    bounds = (0.0, 4 * np.pi * 2.5)
+    curve = fm.fold_curve(scene, start=start, parameter="electric.total_charge", bounds=bounds, direction=direction)
+    q = np.array(curve.values) / (4 * np.pi)
+    assert curve.values[-1] == bounds[direction > 0]
+    assert np.cbrt(np.array(curve.volume) * 3 / (4 * np.pi)) == pytest.approx((7 * (1 + q**2)) ** (1 / 6), rel=1e-9)
+
+
+@pytest.mark.parametrize("tension_field", [False, True])
+@pytest.mark.parametrize(("number", "value"), [("electric.total_charge", 0.3), ("material.jm", 30.0), ("membrane.prestretch", 1.05)])
+def test_third_derivatives_of_a_total_charge(number, value, tension_field):
+    """What a fold curve needs, by central differences of the quadratic form; electrodes on a part."""
+    scene = DISC.replace(material=fm.Gent(30.0), mesh=fm.disc(4), degree=3, tension_field=tension_field, prestretch=1.01)
+    scene = under(scene, total_charge=0.3, start=0.2, stop=0.53)
+    parameter = Parameter(scene, number)
+    family = Family(scene, parameter.vary, scene_at=parameter.scene_at)
+    r = family.space.interpolation_points()
+    x = family.space.interpolate((-0.3 if tension_field else -0.05) * r * (1 - r**2), 0.5 * (1 - r**4))
+    mode, direction = np.random.default_rng(1).standard_normal((2, x.size))
+
+    def form(step, pressure, change):
+        at = family.evaluate(x + step * direction, 0.4 + pressure, value + change)
+        return at.inner(mode, mode) - 2 * 0.3 * (at.volume_gradient @ mode)
+
+    found, h = family.fold_derivatives(x, 0.4, value, mode, 0.3), 1e-6
+    slopes = [(form(*(h * step)) - form(*(-h * step))) / (2 * h) for step in np.eye(3)]
+    assert (found.cubic @ direction, found.cubic_pressure, found.cubic_number) == pytest.approx(slopes, rel=2e-6)
+
+
+@pytest.mark.parametrize("tension_field", [False, True])
+@pytest.mark.parametrize("charge", [1e-12, 0.8])
+def test_ipopt_with_a_total_charge(charge, tension_field):
+    """The voltage as an unknown with the charge as its equation: IPOPT ends where Newton's method does, also without a charge."""
+    scene = under(DISC, total_charge=charge).replace(mesh=fm.disc(8), degree=4, tension_field=tension_field)
+    exact, potential = fm.equilibrium(scene, volume=0.9, solver="newton"), potential_of(scene)
+    for control, factor in ((VolumeControl(0.9), 1.0), (PressureControl(exact.pressure), 1.0), (VolumeControl(0.9), 0.0)):
+        x, pressure, iterations, status = minimize(potential, control, 1.05 * exact.state, exact.pressure, magnetic=factor)
+        assert status == "Solve_Succeeded"
+        assert 0 < iterations < 10
+        wanted = exact if factor else fm.equilibrium(under(scene, voltage=0.0), volume=0.9)
+        assert pressure == pytest.approx(wanted.pressure, rel=1e-8)
+        assert x == pytest.approx(wanted.state, abs=1e-8)
+    assert fm.equilibrium(scene, volume=0.9, solver="ipopt").voltage == pytest.approx(exact.voltage, rel=1e-9)
+
+
+def test_a_charge_beyond_all_bounds_is_a_number_that_is_none():
+    """Outside the domain of the energy a charge has no voltage, and a search goes on from there."""
+    scene = under(DISC, total_charge=3.0, start=0.2, stop=0.6).replace(mesh=fm.disc(8), degree=4, tension_field=True)
+    with pytest.raises(fm.SolveError, match="no equilibrium was found"):
+        fm.equilibrium(scene, volume=0.9, solver="newton")
 
 
 def test_units():

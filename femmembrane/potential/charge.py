@@ -1,7 +1,7 @@
 """A total charge on conducting electrodes: the one term of the potential that is not local.
 
 The energy is W - phi^2 C/2 + Q phi, stationary in the voltage phi, so that phi = Q/C. With s = phi^2 and the gradient c of the capacitance
-C(x, s) at a fixed voltage (which s changes in a tension field alone, through the width of its wrinkles)::
+C(x, s) at a fixed voltage (which s changes through the width of wrinkles, and the thickness of a compressible sheet)::
 
     E_Q' = E_phi'          E_Q'' = E_phi'' + a a^T,      a = c phi/sqrt(C + 2 s dC/ds)
 
@@ -57,15 +57,18 @@ class Charged:
     def __init__(self, potential: Potential) -> None:
         self._potential = potential
 
+    @property
+    def _fixed(self) -> bool:
+        """Whether the capacitance of a state depends on its strains alone: no voltage changes the width of wrinkles, nor the thickness."""
+        scene = self._potential.scene
+        return not (scene.tension_field or hasattr(scene.material, "electrified"))
+
     @cached_property
     @BUILDING
     def expressions(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Densities of C, dC/ds and c at a point."""
         terms, square = self._potential.terms, self._potential.symbols[2][2]
-        if self._potential.scene.tension_field:  # the width changes with the voltage
-            capacitance = -2 * terms["electric"] / square
-        else:
-            capacitance = -2 * ca.substitute(terms["electric"], square, 1.0)
+        capacitance = -2 * (ca.substitute(terms["electric"], square, 1.0) if self._fixed else terms["electric"] / square)
         return capacitance, ca.jacobian(capacitance, square), -2 * ca.jacobian(terms["gradient"], square)
 
     @cached_property
@@ -101,7 +104,7 @@ class Charged:
         for _ in range(_STEPS):
             capacitance = rows[0].sum()  # as all below a number of NumPy, which overflows to infinity
             square = whole / capacitance**2
-            if not self._potential.scene.tension_field or not math.isfinite(square):
+            if self._fixed or not math.isfinite(square):
                 return square, rows
             new = self._rows(x, max(square, least), factor)
             slope, there = new[1].sum(), new[0].sum()

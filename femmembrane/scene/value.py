@@ -230,8 +230,11 @@ class Scene:
             self.electric.plain(self.scales)  # refuses units without scales
             ends = self.mesh.breakpoints()
             self.electric.check(float(ends[0]), float(ends[-1]))
-            if hasattr(self.material, "volume_ratio"):
-                allowed = "an incompressible material is allowed with a voltage or a charge, whose field follows from a constant volume"
+            if hasattr(self.material, "volume_ratio") and not hasattr(self.material, "electrified"):
+                allowed = (
+                    "a compressible material is allowed with a voltage or a charge if it says how the field changes its thickness, in a "
+                    "method `electrified` as that of Hooke; an incompressible one needs none"
+                )
                 raise InputError("material.kind", type(self.material).__name__, allowed)
 
     def _check_sources(self, lift: Lift | None) -> None:

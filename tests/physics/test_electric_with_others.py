@@ -137,7 +137,8 @@ def test_pull_in_beside_a_weak_self_field() -> None:
     weak = plain.replace(sources=[fm.Dipole(1e-8, 6.0)], susceptibility=1.0, demagnetization=True)
     ends = [fm.trace(scene, start=1.5, until={"volume": 40.0}, max_steps=80, throw=False) for scene in (plain, weak)]
     assert ends[0].status is Status.PULLED_IN
-    assert ends[1].status is Status.LEGENDRE_FAILURE
+    assert ends[1].status is Status.PULLED_IN
+    assert "stress and field leave no stiffness along the meridian" in ends[1].message
     assert ends[1][-1].volume == pytest.approx(ends[0][-1].volume, rel=0.05)
 
 

@@ -59,6 +59,8 @@ class Family(Potential):
         The parts of the member at a value of the number, a CasADi symbol here: an object with the attributes of a scene.
     scene_at : callable, optional
         The member itself, a checked scene, for whoever asks for the potential of one.
+    even : bool
+        Whether a number and its negative are the same scene.
     """
 
     @BUILDING
@@ -69,8 +71,10 @@ class Family(Potential):
         quadrature: int | None = None,
         *,
         scene_at: Callable[[float], Scene] | None = None,
+        even: bool = False,
     ) -> None:
         require_elements(scene)
+        self.even = even
         self._scene_at = scene_at or (lambda number: scene)
         self._members: dict[float, Member] = {}
         number = ca.SX.sym("number")

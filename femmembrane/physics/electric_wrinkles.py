@@ -45,6 +45,10 @@ class ElectricTensionField:
 
     def slack_strain(self) -> tuple[Any, Any]:
         """e_0, and whether there is one."""
+        with np.errstate(all="ignore"):  # where there is none Newton's method may go anywhere
+            return self._slack_strain()
+
+    def _slack_strain(self) -> tuple[Any, Any]:
         e: Any = self.taut.voltage * 0.0 + self.taut.charge * 0.0
         for _ in range(_SLACK_STEPS):
             stress, d11, d12 = self._along(e)
@@ -60,6 +64,10 @@ class ElectricTensionField:
 
     def width(self, e: Any) -> tuple[Any, Any]:
         """m(e), and whether there is one."""
+        with np.errstate(all="ignore"):
+            return self._width(e)
+
+    def _width(self, e: Any) -> tuple[Any, Any]:
         m = natural_width(self.taut.material)(e)[0]
         for _ in range(_STEPS):
             slope = self.taut.tangent(e, m)[2]

@@ -89,9 +89,12 @@ class ElectricTensionField:
         least1, least2 = least1 + free * (slack - least1), least2 + free * (slack - least2)
         lost1 = (1 - taut1) * (1 - exists1) + free * (1 - known)
         lost2 = (1 - taut2) * (1 - exists2) + free * (1 - known)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            none1, none2 = 0.0 / (1 - (lost1 > 0)), 0.0 / (1 - (lost2 > 0))
-        return taut1 * e1 + (1 - taut1) * least1 + none1, taut2 * e2 + (1 - taut2) * least2 + none2, taut1, taut2
+        with np.errstate(invalid="ignore"):
+            known1, known2 = (
+                np.sqrt(1.0 - 2 * (lost1 > 0)),
+                np.sqrt(1.0 - 2 * (lost2 > 0)),
+            )  # 1, or NaN for CasADi too, which takes 0/0 for 0
+        return known1 * (taut1 * e1 + (1 - taut1) * least1), known2 * (taut2 * e2 + (1 - taut2) * least2), taut1, taut2
 
     def beyond(self, e1: Any, e2: Any) -> tuple[Any, Any]:
         """Strains beyond natural width, (g_1, g_2): they have the signs that decide where the membrane is taut."""

@@ -14,13 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import ceil
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..discretization.meridian import Disc
+from ..discretization.curve import Curve
+from ..discretization.meridian import Meridian
 from ..discretization.space import Space, space_of
 from ..errors import SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -130,7 +132,7 @@ def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene,
             found = (branch, shortfall)
         if shortfall is None:
             break
-        finer = follow(_on(scene, _disc(chosen, radii=cast(Disc, chosen.mesh).radii)))
+        finer = follow(_on(scene, chosen.mesh.on_ends(chosen.mesh.breakpoints())))
         if not len(finer):
             break
         trial = _estimated([finer[k] for k in _checked(finer)], controls, chosen.mesh.elements)
@@ -188,12 +190,18 @@ def _across(potential: Potential, eq: Equilibrium, scale: float) -> float:
     return abs(met.pressure - eq.pressure) / max(abs(eq.pressure), scale) if met.status is Status.CONVERGED else np.nan
 
 
-def graded(s: Array, density: Array, elements: int) -> tuple[float, ...]:
-    """Ends of elements that share a density, given at points s from 0 to 1, evenly."""
+def graded(s: Array, density: Array, elements: int, corners: ArrayLike = ()) -> tuple[float, ...]:
+    """Ends of elements that share a density, given at points s along the meridian, evenly; with an end at every corner."""
     mass = np.append(0.0, np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(s)))
-    ends = np.interp(np.linspace(0.0, 1.0, elements + 1), mass / mass[-1], s)
-    ends[0], ends[-1] = 0.0, 1.0
-    return tuple(ends.tolist())
+    fixed = np.unique([s[0], *np.asarray(corners, dtype=float), s[-1]])
+    found = [s[:1]]
+    for left, right in pairwise(fixed):
+        begin, end = np.interp([left, right], s, mass)
+        n = max(1, ceil(elements * (end - begin) / mass[-1] - 1e-9))
+        ends = np.interp(np.linspace(begin, end, n + 1)[1:], mass, s)
+        ends[-1] = right
+        found.append(ends)
+    return tuple(np.concatenate(found).tolist())
 
 
 class _Choice:
@@ -208,7 +216,9 @@ class _Choice:
         self.degree = int(np.clip(round(1 - np.log10(accuracy) / 2), 2, most))
 
     def candidate(self, elements: int, degree: int) -> Scene:
-        return self.scene.replace(mesh=_disc(self.scene, radii=graded(*self.density, elements)), degree=degree)
+        mesh = self.scene.mesh
+        ends = graded(*self.density, elements, mesh.corners() if isinstance(mesh, Curve) else ())
+        return self.scene.replace(mesh=mesh.on_ends(ends), degree=degree)
 
     def error(self, elements: int, degree: int) -> float:
         return self.trial.error_on(self.candidate(elements, degree), self.hardest[:_TRIED])
@@ -222,7 +232,7 @@ class _Choice:
             found = self.candidate(elements, self.degree)
             estimated = self.trial.error_on(found, self.hardest)
             if estimated <= self.target:
-                return found.replace(mesh=_disc(found, radii=cast(Disc, found.mesh).radii, accuracy=self.accuracy, estimated=estimated))
+                return found.replace(mesh=found.mesh.on_ends(found.mesh.breakpoints(), self.accuracy, estimated))
             if elements >= _MOST:
                 raise self.not_met(estimated)
             elements = min(elements + 1 + elements // 8, _MOST)
@@ -273,7 +283,8 @@ class _Trial:
     def density(self) -> tuple[Array, Array]:
         """Points s and the density of elements there that suits all states."""
         space = self.space
-        centres, s = (space.ends[1:] + space.ends[:-1]) / 2, np.linspace(0.0, 1.0, 40 * self.elements + 1)
+        first, last = space.ends[[0, -1]]
+        centres, s = (space.ends[1:] + space.ends[:-1]) / 2, np.linspace(first, last, 40 * self.elements + 1)
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
         for eq, weight in zip(self.states, weights, strict=True):
@@ -282,7 +293,7 @@ class _Trial:
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
         if self.controls == ("center_height",):
-            toward = 1 / (s + _POLE_RADIUS)
+            toward = 1 / ((s - first) / (last - first) + _POLE_RADIUS)
             total += _POLE_SHARE * toward / toward.mean()
         return s, total
 
@@ -324,7 +335,7 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
     """The run on the coarsest trial mesh on which its errors can be estimated."""
     controls, trial = _controls(control), None
     for elements in _TRIAL_MESHES:
-        branch = follow(_on(scene, _disc(scene, elements=elements)))
+        branch = follow(_on(scene, _trial_mesh(scene.mesh, elements)))
         if not len(branch):
             failure = SolveError(branch.message, status=branch.status)
             continue
@@ -344,7 +355,7 @@ def _controls(control: str) -> tuple[str, ...]:
     return {"center_height": ("center_height",), "arc-length": ("volume", "center_height")}.get(control, ("volume",))
 
 
-def _on(scene: Scene, mesh: Disc) -> Scene:
+def _on(scene: Scene, mesh: Meridian) -> Scene:
     """The scene of a trial."""
     return scene.replace(mesh=mesh, degree=_TRIAL_DEGREE, run=None, analysis=type(scene.analysis)())
 
@@ -368,7 +379,7 @@ def _least_pressure(equilibria: Iterable[Equilibrium]) -> float:
 
 
 def _accuracy(scene: Scene) -> float:
-    return cast(float, cast(Disc, scene.mesh).accuracy)
+    return cast(float, scene.mesh.accuracy)  # type: ignore[attr-defined]  # an open mesh has one
 
 
 def spread(loads: ArrayLike) -> list[int]:
@@ -381,9 +392,11 @@ def spread(loads: ArrayLike) -> list[int]:
     return sorted({*even, int(np.argmin(loads)), int(np.argmax(loads))})
 
 
-def _disc(scene: Scene, **arguments: Any) -> Disc:
-    """A disc with other elements, its rim held as that of the scene."""
-    return Disc(**arguments, rim=cast(Disc, scene.mesh).rim)
+def _trial_mesh(mesh: Meridian, elements: int) -> Meridian:
+    """A shape on about so many elements, all alike but for the cells of a file."""
+    first, last = (float(s) for s in mesh.breakpoints()[[0, -1]])
+    corners = mesh.corners() if isinstance(mesh, Curve) else ()
+    return mesh.on_ends(graded(np.array([first, last]), np.ones(2), elements, corners))
 
 
 def _misses(space: Space, x: Array) -> Array:

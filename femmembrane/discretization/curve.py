@@ -24,7 +24,19 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import store, switch
 from ..errors import InputError
 from .merging import mended, merged
-from .meridian import LEAST_LENGTH, ROUND_OFF, Array, check_accuracy, check_elements, checked_ends, extent, halved, is_open, refuse_open
+from .meridian import (
+    LEAST_LENGTH,
+    ROUND_OFF,
+    Array,
+    Asked,
+    check_accuracy,
+    check_elements,
+    checked_ends,
+    extent,
+    halved,
+    is_open,
+    refuse_open,
+)
 from .supports import POLE, Held, Support, checked_end, support_of
 
 #: size of a curve beyond which squares and cubes of it are no numbers any more, and below the inverse of which they are zero
@@ -73,7 +85,7 @@ class Curve:
     last: Held = "clamped"
     repaired: tuple[str, ...] = field(default=(), compare=False)
     ends: tuple[float, ...] | None = None
-    accuracy: float | None = None
+    accuracy: Asked | None = None
     estimated: float | None = None
 
     def __post_init__(self) -> None:
@@ -182,7 +194,7 @@ class Curve:
         slope = b - a + (4 * (1 - 2 * t[..., None]) * (m - (a + b) / 2) if self.curved else 0.0)
         return slope[..., 0] / size, slope[..., 1] / size
 
-    def on_ends(self, ends: Sequence[float] | Array, accuracy: float | None = None, estimated: float | None = None) -> Self:
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
         return replace(self, divisions=1, ends=tuple(float(s) for s in ends), accuracy=accuracy, estimated=estimated)
 
     def refined(self) -> Self:
@@ -226,7 +238,7 @@ def meridian_from_points(
     divisions: int = 1,
     first: Held = "clamped",
     last: Held = "clamped",
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
 ) -> Curve:
     """A meridian from points and the cells between them, brought into the order that the module describes.
 

@@ -17,16 +17,16 @@ So a dome is filled from below and a bowl from above. A liquid with gamma > 0 (:
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import FINITE, between, is_number, whole
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from .supports import CLAMPED, POLE, Held, Support, checked_end, support_of
 
 Array = NDArray[np.float64]
@@ -43,6 +43,62 @@ ROUND_OFF = 1e-6
 LEAST_LENGTH = 1e-12
 #: ratios of sizes reach from one over this to this: beyond, the smallest elements drown in round-off
 MAX_RATIO = 1e6
+
+
+@dataclass(frozen=True)
+class Accuracy(Mapping[str, float]):
+    """Relative accuracies by what they are asked of: ``accuracy = {pressure = 1e-8, eigenvalues = 1e-4, profile = 1e-6}``.
+
+    Parameters
+    ----------
+    pressure : float, optional
+        Of P and of the total energy at the same volume.
+    eigenvalues : float, optional
+        Of the smallest axisymmetric eigenvalues under pressure and volume control, over their size; where they pass through zero over a
+        hundredth of the largest size along the run.
+    profile : float, optional
+        Of the displacement, root mean square over the membrane, over its own root mean square.
+    """
+
+    pressure: float | None = None
+    eigenvalues: float | None = None
+    profile: float | None = None
+
+    def __getitem__(self, key: str) -> float:
+        value = getattr(self, key) if key in ACCURATE else None
+        if value is None:
+            raise KeyError(key)
+        return float(value)
+
+    def __iter__(self) -> Iterator[str]:
+        return (key for key in ACCURATE if getattr(self, key) is not None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    @property
+    def tightest(self) -> float:
+        """The smallest of them."""
+        return min(self.values())
+
+    def __str__(self) -> str:
+        return "{" + ", ".join(f"{key} = {value:g}" for key, value in self.items()) + "}"
+
+
+#: an accuracy as a user names it: of P and the energy, or by what it is asked of
+Asked: TypeAlias = float | Mapping[str, float]
+#: what an accuracy may be asked of
+ACCURATE = ("pressure", "eigenvalues", "profile")
+
+
+def by_quantity(accuracy: Asked) -> Accuracy:
+    """Accuracies by what they are asked of; a number is asked of P and the energy."""
+    return accuracy if isinstance(accuracy, Accuracy) else Accuracy(**accuracy) if isinstance(accuracy, Mapping) else Accuracy(accuracy)
+
+
+def in_words(accuracy: Asked) -> str:
+    """An accuracy for messages."""
+    return str(by_quantity(accuracy)) if isinstance(accuracy, Mapping) else f"{accuracy:g}"
 
 
 class Meridian(Hashable, Protocol):
@@ -88,7 +144,7 @@ class Meridian(Hashable, Protocol):
         elements : int
         """
 
-    def on_ends(self, ends: Sequence[float] | Array, accuracy: float | None = None, estimated: float | None = None) -> Self:
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
         """The same shape on elements that end at given places.
 
         Parameters
@@ -126,8 +182,9 @@ class Disc:
     radii : sequence of float, optional
         Ends of the elements, over R0, strictly increasing from 0 to 1. They give any other grading, in place of ``elements`` and ``ratio``.
     accuracy : float, optional
-        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all of the above. Until they are
-        chosen the mesh is open: it has no elements, and nothing can be computed on it.
+        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all of the above. A number is asked
+        of P and of the energy, a mapping of what it names (:class:`Accuracy`). Until they are chosen the mesh is open: it has no elements,
+        and nothing can be computed on it.
     rim : str or mapping
         How the rim is held, "clamped", and where if not at radius 1 and height 0: ``{"kind": "clamped", "radius": 1.2, "height": 0.3}``.
     estimated : float, optional
@@ -142,7 +199,7 @@ class Disc:
     elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
     ratio: float = 1.0
     radii: tuple[float, ...] | None = None
-    accuracy: float | None = None
+    accuracy: Asked | None = None
     estimated: float | None = None
     rim: Held = field(default=CLAMPED, metadata={"quiet": True})
 
@@ -214,7 +271,7 @@ class Disc:
             return self.on_ends(like(self.radii, elements))
         return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
 
-    def on_ends(self, ends: Sequence[float] | Array, accuracy: float | None = None, estimated: float | None = None) -> Self:
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
         radii = tuple(float(r) for r in ends)
         return type(self)(radii=radii, accuracy=accuracy, estimated=estimated, rim=self.rim)
 
@@ -226,7 +283,7 @@ def disc(
     elements: int | None = None,
     ratio: float = 1.0,
     radii: Sequence[float] | None = None,
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
     rim: Held = CLAMPED,
 ) -> Disc:
     """Mesh of the flat, clamped disc.
@@ -303,7 +360,7 @@ def check_accuracy(mesh: Any, places: str, *, given: bool) -> None:
         if mesh.estimated is not None:
             raise InputError("mesh.estimated", mesh.estimated, "it belongs to a mesh that was chosen for mesh.accuracy; leave it out")
         return
-    _positive("mesh.accuracy", mesh.accuracy, MOST_ACCURACY, LEAST_ACCURACY, " (relative error of the pressure and the energy)")
+    object.__setattr__(mesh, "accuracy", _checked_accuracy(mesh.accuracy))
     if mesh.estimated is not None:
         _positive("mesh.estimated", mesh.estimated, 0.0, math.inf, "")
     chosen = "not allowed together with mesh.accuracy, for which the mesh is chosen; leave one out"
@@ -313,9 +370,21 @@ def check_accuracy(mesh: Any, places: str, *, given: bool) -> None:
     if mesh.open and given:
         key = next(key for key in ("elements", "divisions", "ratio") if getattr(mesh, key, None) not in (None, 1))
         raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
-    for name in ("accuracy", "estimated"):
-        if getattr(mesh, name) is not None:
-            object.__setattr__(mesh, name, float(getattr(mesh, name)))
+    if mesh.estimated is not None:
+        object.__setattr__(mesh, "estimated", float(mesh.estimated))
+
+
+def _checked_accuracy(given: Any) -> float | Accuracy:
+    if not isinstance(given, Mapping):
+        _positive("mesh.accuracy", given, MOST_ACCURACY, LEAST_ACCURACY, " (relative error of the pressure and the energy), or a table")
+        return float(given)
+    for name, value in given.items():
+        if name not in ACCURATE:
+            raise unknown_name(f"mesh.accuracy.{name}", value, ACCURATE)
+        _positive(f"mesh.accuracy.{name}", value, MOST_ACCURACY, LEAST_ACCURACY, " (relative error)")
+    if not given:
+        raise InputError("mesh.accuracy", {}, "a number, or a table with one or more of these is allowed: " + ", ".join(ACCURATE))
+    return Accuracy(**{name: float(value) for name, value in given.items()})
 
 
 def _positive(key: str, value: Any, least: float, most: float, what: str) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, unknown_name
 from .curve import Curve, ordered_curve
 from .dialects import READERS, Lines, UnreadableError, read_lines
-from .meridian import ROUND_OFF, Array, Meridian
+from .meridian import ROUND_OFF, Array, Asked, Meridian
 from .supports import Held
 
 #: kinds of files that are written, and read as well, by their suffix; with the format that meshio is to write
@@ -30,7 +30,7 @@ def read_meridian(
     divisions: int = 1,
     first: Held = "clamped",
     last: Held = "clamped",
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
 ) -> Curve:
     """A meridian from a mesh file (.vtu, .msh, .vtk, .xdmf, .vtp, .inp), see :mod:`.dialects`.
 

@@ -35,6 +35,7 @@ from ..errors import InputError
 from .meridian import (
     ELEMENTS,
     Array,
+    Asked,
     check_accuracy,
     check_elements,
     check_ratio,
@@ -57,7 +58,7 @@ class _Divided:
 
     elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
     ends: tuple[float, ...] | None = None
-    accuracy: float | None = None
+    accuracy: Asked | None = None
     estimated: float | None = None
 
     def __post_init__(self) -> None:
@@ -110,7 +111,7 @@ class _Divided:
         ends[-1] = self.stop
         return ends
 
-    def on_ends(self, ends: Sequence[float] | Array, accuracy: float | None = None, estimated: float | None = None) -> Self:
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
         plain = {"ratio": 1.0} if hasattr(self, "ratio") else {}
         places = tuple(float(s) for s in ends)
         return replace(self, elements=None, ends=places, accuracy=accuracy, estimated=estimated, **plain)  # type: ignore[arg-type]
@@ -184,6 +185,7 @@ class Annulus(_Graded):
         Ends of the elements along the meridian, over R0; in place of ``elements`` and ``ratio``.
     accuracy : float, optional
         Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all that says how long they are.
+        A number is asked of P and of the energy, a mapping of what it names (:class:`~.meridian.Accuracy`).
     estimated : float, optional
         The relative error that was estimated when the mesh was chosen. Such a mesh has ``accuracy`` and ``ends`` as well.
     inner, outer : str or mapping
@@ -413,7 +415,7 @@ def annulus(
     outer: Held = "clamped",
     *,
     ends: Sequence[float] | None = None,
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
 ) -> Annulus:
     """Mesh of a flat ring.
 
@@ -459,7 +461,7 @@ def cap(
     rim: Held = "clamped",
     *,
     ends: Sequence[float] | None = None,
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
 ) -> Cap:
     """Mesh of a spherical cap over a rim of unit radius.
 
@@ -502,7 +504,7 @@ def sphere(
     ratio: float = 1.0,
     *,
     ends: Sequence[float] | None = None,
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
 ) -> Sphere:
     """Mesh of a closed sphere of unit radius.
 
@@ -546,7 +548,7 @@ def cylinder(
     bottom: Held = "clamped",
     *,
     ends: Sequence[float] | None = None,
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
 ) -> Cylinder:
     """Mesh of a tube of unit radius about the axis.
 
@@ -586,7 +588,7 @@ def cylinder(
     return Cylinder(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
-def torus(aspect: float, elements: int | None = None, *, ends: Sequence[float] | None = None, accuracy: float | None = None) -> Torus:
+def torus(aspect: float, elements: int | None = None, *, ends: Sequence[float] | None = None, accuracy: Asked | None = None) -> Torus:
     """Mesh of a torus with a round tube of unit radius.
 
     Parameters

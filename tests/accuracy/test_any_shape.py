@@ -80,3 +80,49 @@ def test_ends_that_are_given():
     assert finer.elements == 3
     with pytest.raises(fm.InputError, match=r"mesh.ends = .* the end of a cell at"):
         cut.on_ends([ends[0], ends[1] * 1.1, ends[2]])
+
+
+@pytest.mark.parametrize(
+    "asked", [{"eigenvalues": 1e-6}, {"profile": 1e-6}, {"pressure": 1e-8, "eigenvalues": 1e-4, "profile": 1e-5}], ids=lambda a: "+".join(a)
+)
+def test_what_is_asked_is_what_is_kept(asked, tmp_path):
+    """Each quantity against halved elements of two degrees more; a scene file keeps the table."""
+    volumes = (1.2, 5.0, 20.0)
+    scene = fm.Scene(material=OGDEN, mesh=fm.disc(accuracy=asked), sources=[fm.Dipole(200, 6.5)], susceptibility=2.5)
+    branch = fm.inflate(scene, volumes=volumes, solver="newton")
+    mesh, degree = branch.scene.mesh, branch.scene.degree
+    best = fm.inflate(branch.scene.replace(mesh=mesh.on_ends(mesh.breakpoints()).refined(), degree=degree + 2), volumes=volumes)
+    r = np.linspace(0, 1, 41)
+
+    def profile(eq):
+        return np.hstack([eq.profile(r)["rho"] - r, eq.profile(r)["eta"]])
+
+    for eq, other in zip(branch, best, strict=True):
+        errors = {
+            "pressure": abs(eq.pressure / other.pressure - 1),
+            "eigenvalues": max(
+                abs(eq.verdict(c).smallest_eigenvalue / other.verdict(c).smallest_eigenvalue - 1) for c in ("pressure", "volume")
+            ),
+            "profile": np.linalg.norm(profile(eq) - profile(other)) / np.linalg.norm(profile(other)),
+        }
+        for name, accuracy in asked.items():
+            assert errors[name] < accuracy, name
+    branch.scene.to_toml(tmp_path / "scene.toml")
+    assert fm.Scene.from_toml(tmp_path / "scene.toml") == branch.scene
+    assert f"chosen for accuracy {{{', '.join(f'{k} = {v:g}' for k, v in asked.items())}}}" in str(branch)
+
+
+@pytest.mark.parametrize(
+    ("given", "key", "text"),
+    [
+        ({"presure": 1e-6}, "mesh.accuracy.presure", "known: eigenvalues, pressure, profile"),
+        ({"profile": 0.0}, "mesh.accuracy.profile", "from 1e-12 to 0.1"),
+        ({}, "mesh.accuracy", "one or more of these"),
+        ("fine", "mesh.accuracy", "or a table"),
+    ],
+)
+def test_accuracies_that_are_refused(given, key, text):
+    with pytest.raises(fm.InputError) as caught:
+        fm.sphere(accuracy=given)
+    assert caught.value.key == key
+    assert text in str(caught.value)

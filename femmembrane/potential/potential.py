@@ -162,6 +162,12 @@ class Evaluation:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
         return self.elements.force_scale(self._densities, pressure)
 
+    def form_parts(self, mode: Array) -> tuple[float, float]:
+        """Of the integrand of mode . (E'' - P V'') mode, less what the :attr:`spring` adds: see :meth:`.Elements.form_parts`. The weights
+        are those of the highest polynomial that the quadrature points of an element tell apart.
+        """
+        return self.elements.form_parts(self._densities, np.ascontiguousarray(mode), self.potential.space.highest)
+
     @property
     def load_energy(self) -> float:
         """Energy of the loads at x: computed only when asked for, as no solver needs it."""

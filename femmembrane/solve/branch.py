@@ -62,7 +62,9 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def unit_point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose tangent is known up to its length."""
-        return self.point(state, tangent / self.norm(tangent), sigma)
+        dual = self.dual(tangent)
+        length = math.sqrt(max(float(dual.dot(tangent)), 0.0))
+        return BranchPoint(state, joined(state.x, state.pressure), tangent / length, dual / length, sigma)
 
     def point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose unit tangent is known."""

@@ -78,8 +78,10 @@ class Segment(Generic[Point]):
             return []
         if quantity not in self._folds:
             kind = next((k for k, q in self.problem.folds.items() if q == quantity), "")
-            shares = self._brackets(quantity)
-            rates = [self.at(s).rate(quantity) for s in shares]
+            r0, r1 = self.a.rate(quantity), self.b.rate(quantity)
+            shares, rates = [0.0, 1.0], [r0, r1]
+            if (top := self._extremum(quantity, r0, r1)) is not None:
+                shares, rates = [0.0, top, 1.0], [r0, self.at(top).rate(quantity), r1]
             found = [
                 self._root(kind, lambda point: point.rate(quantity), lo, hi)
                 for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
@@ -96,16 +98,16 @@ class Segment(Generic[Point]):
         known = max(self.problem.resolution, located.error if self.problem.resolution else 0.0)
         return moved >= known * max(self.problem.unit(quantity), abs(before))
 
-    def _brackets(self, quantity: Followed) -> list[float]:
-        """0, 1, and between them the extremum of the rate where the cubic says that the rate changes sign twice."""
-        r0, r1 = (p.rate(quantity) * self.length for p in (self.a, self.b))
+    def _extremum(self, quantity: Followed, r0: float, r1: float) -> float | None:
+        """The share at which the rate, known at both ends, is extreme, where the cubic says that the rate changes sign twice."""
+        if not r0 * r1 > 0:
+            return None
+        r0, r1 = r0 * self.length, r1 * self.length
         rise = self.b.value(quantity) - self.a.value(quantity)
         # rate of the cubic: r0 (1 - t)(1 - 3t) + r1 t (3t - 2) + 6 rise t (1 - t)
         a2, a1 = 3 * (r0 + r1 - 2 * rise), -4 * r0 - 2 * r1 + 6 * rise
         top = -a1 / (2 * a2) if a2 else 0.5
-        if r0 * r1 > 0 and 0.02 < top < 0.98 and (r0 + top * (a1 + top * a2)) * r0 < 0.02 * r0 * r0:
-            return [0.0, float(top), 1.0]
-        return [0.0, 1.0]
+        return float(top) if 0.02 < top < 0.98 and (r0 + top * (a1 + top * a2)) * r0 < 0.02 * r0 * r0 else None
 
     def root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> Located[Point]:
         """The point between two shares of the segment where a function of the point changes sign."""

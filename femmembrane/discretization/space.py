@@ -42,6 +42,8 @@ class Space(Numbering):
     ----------
     table : ndarray, shape (4 n_quadrature, 2 (degree + 1))
         (u, u_x, w, w_x) at the quadrature points of an element from its coefficients.
+    reach : float
+        How far a component of the displacement may be from zero at quadrature points and nodes, over the largest of its coefficients.
     highest : ndarray, shape (n_quadrature,)
         The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
     """
@@ -65,6 +67,7 @@ class Space(Numbering):
         blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
         self.table = np.block(blocks)
         self._magnitudes = np.abs(self.table)
+        self.reach = max(1.0, float(np.abs(value).sum(axis=1).max()))
         rows = self.table.reshape(4, self.n_quadrature, -1)
         outer = []
         for i, j in HESSIAN_PAIRS:
@@ -315,8 +318,9 @@ class Space(Numbering):
             _, u_s, _, w_s = self.lift.at(self.mesh, np.stack([self.ends[:-1], self.ends[1:]]))
             at_rest = at_rest + (u_s + 1j * w_s) / length
         slope = self.shape_functions(np.array([0.0, 1.0]))[1]
-        per_length = np.tile(1 / (length * self.sizes), (2, 1))
-        return np.concatenate([at_rest.real, at_rest.imag]), np.kron(np.eye(2), slope), per_length, rest_kinks, poles
+        none = np.zeros_like(slope)
+        slopes, per_length = np.block([[slope, none], [none, slope]]), np.tile(1 / (length * self.sizes), (2, 1))
+        return np.concatenate([at_rest.real, at_rest.imag]), slopes, per_length, rest_kinks, poles
 
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.

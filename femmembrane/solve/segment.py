@@ -21,6 +21,8 @@ from .state import hermite
 
 #: a fold that lies this close to a value, relative to its size and one unit, lies on it
 ON_FOLD = 1e-13
+#: correction of a share of a segment that is round-off, with what a quantity is known by
+_SHARE = 1e-11
 
 
 @dataclass(slots=True)
@@ -152,7 +154,10 @@ class Segment(Generic[Point]):
 
         A fold in the quantity between the ends may lie on either side of the value, or on it, within round-off: then it is the point.
         """
-        shares = [0.0, *(share for share, _ in self._folds_in(quantity)), 1.0]
+        folds = self._folds_in(quantity)
+        if not folds and (self.a.value(quantity) - value) * (self.b.value(quantity) - value) > 0:
+            return []
+        shares = [0.0, *(share for share, _ in folds), 1.0]
         ends = [self.at(s).value(quantity) - value for s in shares]
         least = ON_FOLD * (self.problem.unit(quantity) + abs(value))
         ends = [ends[0], *(0.0 if abs(e) <= least else e for e in ends[1:-1]), ends[-1]]
@@ -167,7 +172,9 @@ class Segment(Generic[Point]):
             a, b = self.a.value(quantity), self.b.value(quantity)
             rest.sigma = self.a.sigma + self.length * (a / (a - b) if a != b else high)
             return rest
-        share = brentq(lambda s: self.at(s).value(quantity) - value, low, high, xtol=1e-14, rtol=8.9e-16, disp=False)
+        share = self._share_of(quantity, value, low, high)
+        if share is None:
+            share = brentq(lambda s: self.at(s).value(quantity) - value, low, high, xtol=1e-14, rtol=8.9e-16, disp=False)
         point = self.at(share)
         held = self.problem.hold(quantity, value, point)
         if held is None:  # so close to a fold that the control is singular
@@ -175,6 +182,27 @@ class Segment(Generic[Point]):
         held.sigma = point.sigma
         # next to a fold the corrector may have ended on its other side
         return held if held.rate(quantity) * point.rate(quantity) > 0 else point
+
+    def _share_of(self, quantity: Followed, value: float, low: float, high: float) -> float | None:
+        """Where a quantity takes a value between two shares, by Newton's method from the inverse cubic; None where it leads out."""
+        ends = [self.at(s) for s in (low, high)]
+        before, after = (point.value(quantity) - value for point in ends)
+        slopes = [point.rate(quantity) * self.length for point in ends]
+        if not slopes[0] * slopes[1] > 0:
+            return None
+        share: float = hermite(low, 1 / slopes[0], high, 1 / slopes[1], before / (before - after), after - before)
+        for _ in range(5):
+            if not low < share < high:
+                return None
+            point = self.at(share)
+            slope = point.rate(quantity) * self.length
+            if not slope * slopes[0] > 0:
+                return None
+            step = (point.value(quantity) - value) / slope
+            if abs(step) <= _SHARE:
+                return share
+            share -= step
+        return None
 
     def passes(self, start: Point) -> bool:
         """Whether the curve comes back to its first point here."""

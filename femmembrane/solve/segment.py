@@ -7,6 +7,7 @@ rate itself, not the step, decides when it is found.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic
@@ -23,6 +24,8 @@ from .state import hermite
 ON_FOLD = 1e-13
 #: correction of a share of a segment that is round-off, with what a quantity is known by
 _SHARE = 1e-11
+#: correction that is round-off in any case
+_ROUND_OFF = 1e-14
 
 
 @dataclass(slots=True)
@@ -81,11 +84,14 @@ class Segment(Generic[Point]):
         if quantity not in self._folds:
             kind = next((k for k, q in self.problem.folds.items() if q == quantity), "")
             r0, r1 = self.a.rate(quantity), self.b.rate(quantity)
-            shares, rates = [0.0, 1.0], [r0, r1]
-            if (top := self._extremum(quantity, r0, r1)) is not None:
-                shares, rates = [0.0, top, 1.0], [r0, self.at(top).rate(quantity), r1]
+            shares, rates, guess = [0.0, 1.0], [r0, r1], None
+            if r0 * r1 > 0:
+                if (top := self._extremum(quantity, r0, r1)) is not None:
+                    shares, rates = [0.0, top, 1.0], [r0, self.at(top).rate(quantity), r1]
+            elif r0 * r1 < 0:
+                guess = self._turn(quantity, r0, r1)
             found = [
-                self._root(kind, lambda point: point.rate(quantity), lo, hi)
+                self._root(kind, lambda point: point.rate(quantity), lo, hi, guess)
                 for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
                 if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
             ]
@@ -101,23 +107,40 @@ class Segment(Generic[Point]):
         return moved >= known * max(self.problem.unit(quantity), abs(before))
 
     def _extremum(self, quantity: Followed, r0: float, r1: float) -> float | None:
-        """The share at which the rate, known at both ends, is extreme, where the cubic says that the rate changes sign twice."""
-        if not r0 * r1 > 0:
-            return None
-        r0, r1 = r0 * self.length, r1 * self.length
-        rise = self.b.value(quantity) - self.a.value(quantity)
-        # rate of the cubic: r0 (1 - t)(1 - 3t) + r1 t (3t - 2) + 6 rise t (1 - t)
-        a2, a1 = 3 * (r0 + r1 - 2 * rise), -4 * r0 - 2 * r1 + 6 * rise
+        """The share at which the rate, of one sign at both ends, is extreme, where the cubic says that it changes sign twice between."""
+        a2, a1, r0 = self._rate_of_cubic(quantity, r0, r1)
         top = -a1 / (2 * a2) if a2 else 0.5
         return float(top) if 0.02 < top < 0.98 and (r0 + top * (a1 + top * a2)) * r0 < 0.02 * r0 * r0 else None
+
+    def _turn(self, quantity: Followed, r0: float, r1: float) -> tuple[float, float] | None:
+        """The share at which the rate of the cubic, of opposite signs at both ends, passes zero, and its slope there."""
+        a2, a1, r0 = self._rate_of_cubic(quantity, r0, r1)
+        discriminant = a1 * a1 - 4 * a2 * r0
+        if not (discriminant > 0 and a2):
+            return None
+        slope = math.copysign(math.sqrt(discriminant), r1)  # a rate that is negative first rises through zero
+        share = -2 * r0 / (a1 + slope) if a1 * slope > 0 else (slope - a1) / (2 * a2)  # whichever does not cancel
+        return share, slope / self.length
+
+    def _rate_of_cubic(self, quantity: Followed, r0: float, r1: float) -> tuple[float, float, float]:
+        """Coefficients of t^2, t and 1 of the derivative of the cubic through the ends."""
+        r0, r1 = r0 * self.length, r1 * self.length
+        rise = self.b.value(quantity) - self.a.value(quantity)
+        # r0 (1 - t)(1 - 3t) + r1 t (3t - 2) + 6 rise t (1 - t)
+        return 3 * (r0 + r1 - 2 * rise), -4 * r0 - 2 * r1 + 6 * rise, r0
 
     def root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> Located[Point]:
         """The point between two shares of the segment where a function of the point changes sign."""
         return self._root(kind, function, low, high)[1]
 
-    def _root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> tuple[float, Located[Point]]:
+    def _root(
+        self, kind: str, function: Callable[[Point], float], low: float, high: float, guess: tuple[float, float] | None = None
+    ) -> tuple[float, Located[Point]]:
+        """The root with its share. ``guess`` is a share close to it and the slope of the function there, where they are known."""
         try:
-            share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60, disp=False)
+            share = None if guess is None else self._by_secants(function, low, high, *guess)
+            if share is None:
+                share = brentq(lambda s: function(self.at(s)), low, high, xtol=1e-14, rtol=8.9e-16, maxiter=60, disp=False)
         except SolveError:  # another branch crosses at the fold, as where a branch of pears ends on that of the spheres
             low, high = self.narrowed(function, low, high)
             return low, Located(kind, self.at(low), (high - low) * self.length + self.spread(low, high))
@@ -130,6 +153,23 @@ class Segment(Generic[Point]):
         offset = (abs(function(point) / slope) if slope else self.length) + point.state.correction
         moved = max(abs(point.rate(q)) * offset / (unit + abs(point.value(q))) for q, unit in self.problem.units.items())
         return share, Located(kind, point, float(moved + point.state.correction))
+
+    def _by_secants(self, function: Callable[[Point], float], low: float, high: float, share: float, slope: float) -> float | None:
+        """The root next to a share, from where a few secants lead; None where they do not."""
+        before, value_before, last = share, math.nan, math.inf
+        for _ in range(7):
+            if not low < share < high:
+                return None
+            value = function(self.at(share))
+            if share != before:
+                slope = (value - value_before) / (share - before)
+            step = value / slope if slope else math.inf
+            # the last steps are as long as round-off of the function makes them
+            if abs(step) <= _ROUND_OFF or last / 4 < abs(step) <= _SHARE:
+                return share
+            before, value_before, last = share, value, abs(step)
+            share -= step
+        return None
 
     def narrowed(self, function: Callable[[Point], float], low: float, high: float) -> tuple[float, float]:
         """The shares between which a function of the point changes sign, by bisection as far as points can be resolved."""

@@ -12,6 +12,7 @@ error was to the side of its own sign.
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import blas
 
 from ..discretization.space import Space
 from ..kernels.numpy_kernels import form_parts
@@ -55,7 +56,7 @@ def unresolved_stress(space: Space, stress: Array) -> float:
 
 def _size(values: Array) -> float:
     """Sum of absolute values."""
-    return float(np.add.reduce(np.abs(values), axis=None))
+    return float(blas.dasum(values.ravel()))
 
 
 def unresolved_axisymmetric(evaluation: Evaluation, mode: Array) -> float:

@@ -257,7 +257,9 @@ class Equilibrium:
         key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
         if control == "gas" and gas is None:
             gas = self.enclosed
-        potential = self.potential if electric is None else self._holding(electric)
+        if electric is None:
+            return self.remembered(key, lambda: self._judged(self.potential, control, azimuthal, gas))
+        potential = self._holding(electric)
         key = key if potential is self.potential else (*key, electric)
         return self.remembered(key, lambda: self._judged(potential, control, azimuthal, gas))
 

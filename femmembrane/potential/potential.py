@@ -423,15 +423,12 @@ class Potential:
         names = ("voltage", "charge", "capacitance", "electric_field")
         if self.electric is None:
             return dict.fromkeys(names, 0.0)
-        space, sheet = self.space, self.sheet
-        thickness = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[0]
-        square = self._field_squared(x)
-        largest = float(np.sqrt(square.max()))
+        space, largest = self.space, self.largest_field(x)
         if self.electric.frozen_charge is not None:
             covered = float((space.area_weights * self.electric.covers(space.s)).sum())
             return dict(zip(names, (np.nan, self.electric.frozen_charge * covered, np.nan, largest), strict=True))
         phi = math.sqrt(self.square(x) or 0.0)
-        capacitance = float((space.area_weights * thickness * square).sum()) / phi**2
+        capacitance = 2 * abs(self.electric_energy(x)) / phi**2
         return dict(zip(names, (phi, phi * capacitance, capacitance, largest), strict=True))
 
     @cached_property

@@ -123,8 +123,9 @@ class Equilibrium:
     @property
     def breakdown_ratio(self) -> float:
         """Largest true field over the breakdown field; NaN where the scene gives none."""
-        electricity = self.scene.electricity
-        return np.nan if electricity is None or electricity.breakdown is None else self.electric_field / electricity.breakdown
+        own = self.scene.electric  # where its number is 0, the field is
+        breakdown = None if own is None else own.plain(self.scene.scales).breakdown
+        return np.nan if breakdown is None else self.electric_field / breakdown
 
     @property
     def _electric(self) -> dict[str, float]:
@@ -223,7 +224,7 @@ class Equilibrium:
         """
         space = self.potential.space
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
-        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.converter)
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.

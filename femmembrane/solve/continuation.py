@@ -168,6 +168,10 @@ class CurveProblem(ABC, Generic[Point]):
         """Whether no curve leads from one point to the other, though a step did."""
         return False
 
+    def mirrored(self, point: Point) -> bool:
+        """Whether the curve is symmetric about a point, where quantities are stationary and nothing turns."""
+        return False
+
     def rest_between(self, a: Point, b: Point) -> Point | None:
         """The state at rest if it lies between two points and no corrector finds it."""
         return None

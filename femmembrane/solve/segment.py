@@ -93,7 +93,7 @@ class Segment(Generic[Point]):
             found = [
                 self._root(kind, lambda point: point.rate(quantity), lo, hi, guess)
                 for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
-                if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0)
+                if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0 and not self.problem.mirrored(self.a))
             ]
             self._folds[quantity] = [fold for fold in found if self._turns(quantity, fold[1])]
         return self._folds[quantity]

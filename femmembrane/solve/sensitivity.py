@@ -23,7 +23,7 @@ import numpy as np
 
 from ..errors import InputError, SolveError, Status
 from ..kernels.interface import Border
-from ..potential import Array, Evaluation, Numbered
+from ..potential import Array, Evaluation, NumberDerivatives, Numbered
 from ..scene import Scene
 from ..scene.variation import Numbers, Parameter
 from .banded import BandFactor, BorderedFactor
@@ -77,13 +77,14 @@ class Sensitive:
         groups = [[name for name in own if name not in movers[1:]], *([name] for name in movers[1:])]
         self._groups = [(Numbered(Numbers(scene, tuple(group))), _mixed(rates, group)) for group in groups]
 
-    def equations(self, x: Array, pressure: float) -> tuple[Array, Array, Array]:
+    def equations(self, x: Array, pressure: float) -> NumberDerivatives:
         """Derivatives of E' - P V', of the volume and of the height of the pole at fixed (x, P)."""
-        force, volume, height = np.zeros((len(x), len(self.names))), np.zeros(len(self.names)), np.zeros(len(self.names))
-        for numbered, mix in self._groups:
-            found = numbered.derivatives(x, pressure)
-            force, volume, height = force + found.force @ mix, volume + found.volume @ mix, height + found.height @ mix
-        return force, volume, height
+        parts = [(numbered.derivatives(x, pressure), mix) for numbered, mix in self._groups]
+        force, volume, height = (
+            sum((getattr(own, name) @ mix for own, mix in parts[1:]), getattr(parts[0][0], name) @ parts[0][1])
+            for name in ("force", "volume", "height")
+        )
+        return NumberDerivatives(force, volume, height)
 
     def energies(self, x: Array, pressure: float) -> dict[str, tuple[Array, Array]]:
         """Derivatives of each energy that the scene has with respect to x, and to the numbers at a fixed state."""
@@ -122,11 +123,11 @@ class Sensitive:
         """
         potential, x = evaluation.potential, evaluation.x
         _, row, corner = control.equation(potential.space, x, pressure, evaluation)
-        force, volume, height = self.equations(x, pressure)
-        held = _held_rates(control, pressure, volume, height) + self.gas_rates(control, pressure, evaluation.volume)
+        own = self.equations(x, pressure)
+        held = held_rates(control, pressure, own.volume, own.height) + self.gas_rates(control, pressure, evaluation.volume)
         border = evaluation.border(row, corner)
         refuse_fold(evaluation, border, control)
-        return _solved(border, evaluation, force, held, volume, height)
+        return solved(border, evaluation, held, own)
 
     def at_fold(self, evaluation: Evaluation, pressure: float, kind: str) -> Rates:
         """How a limit point or a volume fold of the scene moves with the numbers.
@@ -139,9 +140,9 @@ class Sensitive:
         x = evaluation.x
         mode, q = null_vector(evaluation, kind)
         row, corner, numbers = self.form(x, pressure, mode, q)
-        force, volume, height = self.equations(x, pressure)
+        own = self.equations(x, pressure)
         border = evaluation.border(np.ascontiguousarray(row), corner)
-        return _solved(border, evaluation, force, numbers, volume, height)
+        return solved(border, evaluation, numbers, own)
 
 
 def _named(scene: Scene, name: str) -> Parameter:
@@ -153,7 +154,7 @@ def _mixed(rates: Sequence[dict[str, float]], group: Sequence[str]) -> Array:
     return np.array([[rate.get(name, 0.0) for rate in rates] for name in group]).reshape(len(group), len(rates))
 
 
-def _held_rates(control: Control, pressure: float, volume: Array, height: Array) -> Array:
+def held_rates(control: Control, pressure: float, volume: Array, height: Array) -> Array:
     """Derivatives of the equation of a control with respect to numbers that move an end, at fixed (x, P)."""
     if isinstance(control, CONTROLS["center_height"].at):  # type: ignore[arg-type]
         return height
@@ -179,15 +180,16 @@ def _name(control: Control) -> str:
     return next((name for name, kind in CONTROLS.items() if type(control) is kind.at), "amount of gas")
 
 
-def _solved(border: Border, evaluation: Evaluation, force: Array, held: Array, volume: Array, height: Array) -> Rates:
-    columns = [border.solve(-np.ascontiguousarray(force[:, k]), -float(held[k])) for k in range(len(held))]
-    dx = np.stack([column for column, _ in columns], axis=1) if columns else force
+def solved(border: Border, evaluation: Evaluation, held: Array, own: NumberDerivatives) -> Rates:
+    """The derivatives of a state from factors, and from those of the equations at a fixed state; one back-substitution a number."""
+    columns = [border.solve(-np.ascontiguousarray(own.force[:, k]), -float(held[k])) for k in range(len(held))]
+    dx = np.stack([column for column, _ in columns], axis=1) if columns else own.force
     dp = np.array([float(p) for _, p in columns])
     if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
         raise SolveError("the equations are singular at this equilibrium, which has no derivative", status=Status.NOT_CONVERGED)
     space = evaluation.potential.space
     pole = dx[space.pole] if space.pole < space.n_free else 0.0
-    return Rates(dx, dp, evaluation.volume_gradient @ dx + volume, pole + height)
+    return Rates(dx, dp, evaluation.volume_gradient @ dx + own.volume, pole + own.height)
 
 
 def null_vector(evaluation: Evaluation, kind: str) -> tuple[Array, float]:

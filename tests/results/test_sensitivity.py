@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import femmembrane as fm
 from femmembrane.scene.variation import Parameter, names
+from femmembrane.solve.responses import Responses
 
 #: quantities of every state
 STATE = ("pressure", "volume", "center_height", "elastic_energy", "energy")
@@ -29,13 +32,18 @@ def again(scene: fm.Scene, name: str, answer: Any) -> tuple[Any, Any]:
     """Derivative of an answer by solving again at neighbouring values, extrapolated to step 0, and how far that is to be trusted."""
     parameter = Parameter(scene, name)
     h = 1.5e-3 * (abs(parameter.value) or 1.0)
-    slopes = [(answer(parameter.scene_at(parameter.value + t)) - answer(parameter.scene_at(parameter.value - t))) / (2 * t) for t in (h, h / 2, h / 4)]
-    fourth = [(4 * b - a) / 3 for a, b in zip(slopes, slopes[1:], strict=False)]
+    slopes = [
+        (answer(parameter.scene_at(parameter.value + t)) - answer(parameter.scene_at(parameter.value - t))) / (2 * t)
+        for t in (h, h / 2, h / 4)
+    ]
+    fourth = [(4 * b - a) / 3 for a, b in pairwise(slopes)]
     best = (16 * fourth[1] - fourth[0]) / 15
     return best, np.abs(best - fourth[1])
 
 
-def compare(scene: fm.Scene, held: Mapping[str, float], of: Sequence[str], to: Sequence[str], start: fm.Equilibrium | None = None, **along: Any) -> None:
+def compare(
+    scene: fm.Scene, held: Mapping[str, float], of: Sequence[str], to: Sequence[str], start: fm.Equilibrium | None = None, **along: Any
+) -> None:
     eq = solved(scene, held, start)
     (control,) = held
     found = eq.sensitivity(list(of), list(to), held=control, r=along.get("r", [0.25, 0.5]))
@@ -54,9 +62,15 @@ SCENES: Mapping[str, tuple[fm.Scene, Mapping[str, float]]] = {
     "ogden": (fm.Scene(fm.Ogden.treloar(), DISC), {"center_height": 1.5}),
     "beyond the limit point": (fm.Scene(fm.MooneyRivlin(0.05), DISC), {"center_height": 2.0}),
     "gent": (fm.Scene(fm.Gent(30.0), DISC), {"volume": 4.0}),
-    "polynomial": (fm.Scene(fm.Polynomial(c10=0.45, c01=0.05, c20=0.02, c11=0.01, c02=0.01, c30=0.01, c21=0.01, c12=0.01, c03=0.01), DISC), {"volume": 2.0}),
+    "polynomial": (
+        fm.Scene(fm.Polynomial(c10=0.45, c01=0.05, c20=0.02, c11=0.01, c02=0.01, c30=0.01, c21=0.01, c12=0.01, c03=0.01), DISC),
+        {"volume": 2.0},
+    ),
     "dipole": (fm.Scene(fm.MooneyRivlin(0.1), DISC, sources=[fm.Dipole(0.05, 1.5)], susceptibility=0.5), {"pressure": 0.4}),
-    "weak dipole": (fm.Scene(fm.NeoHookean(), DISC, sources=[fm.Dipole(0.05, 1.5), fm.Dipole(0.02, 2.0)], susceptibility=2.5), {"volume": 0.4}),
+    "weak dipole": (
+        fm.Scene(fm.NeoHookean(), DISC, sources=[fm.Dipole(0.05, 1.5), fm.Dipole(0.02, 2.0)], susceptibility=2.5),
+        {"volume": 0.4},
+    ),
     "magnetised": (
         fm.Scene(fm.NeoHookean(), DISC, sources=[fm.Dipole(0.05, 1.5)], susceptibility=0.5, saturation=0.4, demagnetization=True),
         {"volume": 1.0},
@@ -92,4 +106,47 @@ SCENES: Mapping[str, tuple[fm.Scene, Mapping[str, float]]] = {
 @pytest.mark.parametrize("case", SCENES)
 def test_derivatives_are_those_of_the_whole_solve(case: str) -> None:
     scene, held = SCENES[case]
-    compare(scene, held, (*STATE, "rho", "eta", "stretch_1", "stretch_2", "mechanical_stress_1", "total_stress_2"), names(scene))
+    to = [name for name in names(scene) if not name.endswith((".1", ".2"))]
+    compare(scene, held, (*STATE, "rho", "eta", "stretch_1", "stretch_2", "mechanical_stress_1", "total_stress_2"), to)
+
+
+def test_the_jacobian_of_a_fit_is_that_of_records() -> None:
+    """Twenty heights, some beyond the limit point: answers and Jacobian against records, and a fit that comes back to its numbers."""
+    scene = fm.Scene(fm.Ogden((1.25,), (1.6,)), DISC)
+    heights = np.linspace(1.2, 0.1, 12)
+    responses = Responses(
+        scene, "center_height", heights, ["material.mu.0", "material.alpha.0"], ["pressure", "volume", ("stretch_2", 0.0)]
+    )
+    there = responses([0.8, 2.5])
+    rubber = fm.Scene(fm.Ogden((0.8,), (2.5,)), DISC)
+    for k in (0, 6):
+        eq = solved(rubber, {"center_height": heights[k]})
+        assert there.values[k] == pytest.approx([eq.pressure, eq.volume, eq.profile([0.0])["stretch_2"][0]], rel=1e-10)
+    h = np.array([0.0, 2e-2])
+    slopes = [(responses([0.8, 2.5] + t * h).values - responses([0.8, 2.5] - t * h).values) / (2 * t * h[1]) for t in (1.0, 0.5, 0.25)]
+    fourth = [(4 * b - a) / 3 for a, b in pairwise(slopes)]
+    assert there.jacobian[..., 1] == pytest.approx((16 * fourth[1] - fourth[0]) / 15, rel=1e-6, abs=1e-8)
+    # the pressure is linear in the only modulus
+    assert there.jacobian[:, 0, 0] == pytest.approx(there.values[:, 0] / 0.8, rel=1e-10)
+
+    def misfit(numbers: Any) -> Any:
+        return responses(numbers).values[:, 0] - there.values[:, 0]
+
+    fit = least_squares(misfit, [1.25, 1.6], jac=lambda numbers: responses(numbers).jacobian[:, 0])
+    assert fit.x == pytest.approx([0.8, 2.5], rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["membrane.prestretch", "mesh.rim.radius"])
+def test_a_fit_may_move_the_rim(name: str) -> None:
+    scene = fm.Scene(fm.NeoHookean(), DISC, prestretch=1.2)
+    if name.startswith("mesh"):
+        scene = fm.Scene(fm.NeoHookean(), fm.disc(16, rim={"kind": "clamped", "radius": 1.2}))
+    of = ["pressure", "center_height", ("rho", 0.5), ("eta", 0.25), ("stretch_1", 0.3), ("stretch_2", 0.0)]
+    responses = Responses(scene, "volume", [1.0, 2.0], [name], of)
+    found = responses([1.3])
+    slopes = [(responses([1.3 + h]).values - responses([1.3 - h]).values) / (2 * h) for h in (2e-3, 1e-3)]
+    assert found.jacobian[..., 0] == pytest.approx((4 * slopes[1] - slopes[0]) / 3, rel=1e-7, abs=1e-9)
+    eq = solved(Parameter(scene, name).scene_at(1.3), {"volume": 2.0})
+    profile = eq.profile([0.5, 0.25, 0.3, 0.0])
+    expected = [profile[asked[0]][k] for k, asked in enumerate(of[2:])]
+    assert found.values[1] == pytest.approx([eq.pressure, eq.center_height, *expected], rel=1e-9)

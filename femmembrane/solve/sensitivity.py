@@ -26,7 +26,7 @@ from ..kernels.interface import Border
 from ..potential import Array, Evaluation, NumberDerivatives, Numbered
 from ..scene import Scene
 from ..scene.variation import Numbers, Parameter
-from .banded import BandFactor, BorderedFactor
+from .banded import BandFactor
 from .controls import CONTROLS, Control, GasOver
 from .state import inner
 
@@ -193,21 +193,16 @@ def solved(border: Border, evaluation: Evaluation, held: Array, own: NumberDeriv
 
 
 def null_vector(evaluation: Evaluation, kind: str) -> tuple[Array, float]:
-    """The null vector (v, q) at a fold of a kind, by inverse iteration, of unit length in v."""
-    gradient = evaluation.volume_gradient
-    factor = BandFactor.of(evaluation)
-    mode, q = gradient, 0.0
-    if kind == "limit_point":
-        for _ in range(_SWEEPS):
-            mode = factor.solve(mode)
-            mode = mode / np.linalg.norm(mode)
-        return mode, 0.0
-    bordered = BorderedFactor(factor, -gradient, -gradient, 0.0)
-    for _ in range(_SWEEPS):
-        mode, q = bordered.solve(mode, q)
+    """The null vector (v, q) at a fold of a kind, of unit length in v.
+
+    At a limit point K v = 0, by inverse iteration. At a volume fold K is regular, and K v = q V'.
+    """
+    factor, mode, q = BandFactor.of(evaluation), evaluation.volume_gradient, 0.0
+    for _ in range(_SWEEPS if kind == "limit_point" else 1):
+        mode = factor.solve(mode)
         size = float(np.linalg.norm(mode))
-        mode, q = mode / size, q / size
-    return mode, q
+        mode, q = mode / size, 1 / size
+    return mode, 0.0 if kind == "limit_point" else q
 
 
 @lru_cache(maxsize=16)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from numpy.typing import ArrayLike, NDArray
 
+from ..discretization.meridian import in_words
 from ..errors import Status, printable
 from ..quantities import PLACES, words, written
 from . import door
@@ -314,7 +315,8 @@ class Branch(Sequence[Equilibrium]):
         accuracy, estimated = (getattr(mesh, name, None) for name in ("accuracy", "estimated"))
         if accuracy is None or estimated is None:
             return ""
-        return f"mesh: {mesh.elements} elements of degree {degree}, graded, chosen for accuracy {accuracy:g}, estimated {estimated:.0e}"
+        chosen = f"chosen for accuracy {in_words(accuracy)}, estimated {estimated:.0e}"
+        return f"mesh: {mesh.elements} elements of degree {degree}, graded, {chosen}"
 
     @property
     def notes(self) -> tuple[str, ...]:

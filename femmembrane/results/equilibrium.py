@@ -123,8 +123,9 @@ class Equilibrium:
     @property
     def breakdown_ratio(self) -> float:
         """Largest true field over the breakdown field; NaN where the scene gives none."""
-        electricity = self.scene.electricity
-        return np.nan if electricity is None or electricity.breakdown is None else self.electric_field / electricity.breakdown
+        own = self.scene.electric  # where its number is 0, the field is
+        breakdown = None if own is None else own.plain(self.scene.scales).breakdown
+        return np.nan if breakdown is None else self.electric_field / breakdown
 
     @property
     def _electric(self) -> dict[str, float]:
@@ -221,7 +222,7 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        return door.profile_at(self.scene, self.state, self.pressure, self.places(r)).columns(self.scene.scales)
+        return door.profile_at(self.scene, self.state, self.pressure, self.places(r)).columns(self.scene.converter)
 
     def places(self, r: ArrayLike | None = None) -> Array:
         """Parameters of the meridian at reference radii, see :meth:`profile`.
@@ -266,7 +267,9 @@ class Equilibrium:
         key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
         if control == "gas" and gas is None:
             gas = self.enclosed
-        potential = self.potential if electric is None else self._holding(electric)
+        if electric is None:
+            return self.remembered(key, lambda: self._judged(self.potential, control, azimuthal, gas))
+        potential = self._holding(electric)
         key = key if potential is self.potential else (*key, electric)
         return self.remembered(key, lambda: self._judged(potential, control, azimuthal, gas))
 

@@ -76,6 +76,11 @@ class Parameter:
             raise InputError("parameter", self.name, "the only modulus is 2/alpha, fixed by the unit of stress; vary material.alpha.0")
 
     @property
+    def even(self) -> bool:
+        """Whether its square alone acts, as that of a voltage or a charge."""
+        return self.name.startswith("electric.")
+
+    @property
     def value(self) -> float:
         """The number in the scene given."""
         part, _, rest = self.name.partition(".")

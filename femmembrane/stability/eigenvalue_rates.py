@@ -64,7 +64,7 @@ def eigenvalue_rates(
             raise InputError("control", control, f"n = {n} waves do not change the volume: leave the control out")
         verdict = _known(azimuthal_verdict(eq.potential, eq.state, eq.pressure, n))
         pencil = azimuthal_operator(eq.potential, eq.state, eq.pressure, n).pencil()
-        _require_simple(pencil, verdict)
+        require_simple(pencil, verdict)
         return _differences(
             lambda state: azimuthal_operator(potential_of(state[0]), state[1], state[2], n).pencil(), verdict, known, moved, step
         )
@@ -75,7 +75,7 @@ def eigenvalue_rates(
     compliance = None if gas is None else gas.compliance(eq.volume)
     verdict = _known(axisymmetric_verdict(eq.potential, evaluation, control or "", compliance=compliance))
     pencil = _pencil(eq.potential, evaluation, control, compliance)
-    _require_simple(pencil, verdict)
+    require_simple(pencil, verdict)
     mode, q = _normal(pencil, verdict), 0.0
     gradient = evaluation.volume_gradient
     along = float(gradient @ mode)
@@ -102,7 +102,7 @@ def _known(verdict: Verdict) -> Verdict:
     return verdict
 
 
-def _require_simple(pencil: Pencil, verdict: Verdict) -> None:
+def require_simple(pencil: Pencil, verdict: Verdict) -> None:
     value = verdict.smallest_eigenvalue
     if pencil.count(value + _SIMPLE * abs(value) + verdict.error) > 1:
         raise InputError("of", "eigenvalue", f"a simple eigenvalue is allowed: {value:.9g} is a multiple one, which has no derivative")

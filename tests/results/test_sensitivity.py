@@ -11,8 +11,11 @@ import pytest
 from scipy.optimize import least_squares
 
 import femmembrane as fm
+from femmembrane.results.verdict import Verdict
 from femmembrane.scene.variation import Parameter, names
 from femmembrane.solve.responses import Responses
+from femmembrane.stability.eigenvalue_rates import require_simple
+from femmembrane.stability.spectrum import Pencil
 
 #: quantities of every state
 STATE = ("pressure", "volume", "center_height", "elastic_energy", "energy")
@@ -369,3 +372,18 @@ def test_a_fold_has_no_derivative_at_what_is_stationary_there() -> None:
         fm.trace(branch.scene, until={"volume": 1.0}).sensitivity("limit_pressure", "material.ratio")
     with pytest.raises(fm.InputError, match="ask for them in two calls"):
         branch.sensitivity(["limit_pressure", "volume"], "material.ratio")
+
+
+def test_a_multiple_eigenvalue_has_no_derivative() -> None:
+    mass = np.zeros((4, 3), order="F")
+    mass[2] = 1.0
+    verdict = Verdict(True, 1.0, 1e-12, "pressure", 0, 0, "stable")
+    for second, simple in ((1.0, False), (1.1, True)):
+        band = np.zeros((4, 3), order="F")
+        band[2] = 1.0, second, 2.0
+        pencil = Pencil(band, mass, 1, None, 0.0)
+        if simple:
+            require_simple(pencil, verdict)
+        else:
+            with pytest.raises(fm.InputError, match="multiple"):
+                require_simple(pencil, verdict)

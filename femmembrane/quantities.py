@@ -290,6 +290,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "stable_equilibria": Quantity(
         "number of them that are stable under the load's control and against the waves asked for", label="number of stable equilibria"
     ),
+    "displacement": Quantity("root mean square of the displacement over the reference area, over R0"),
+    "stress_first": Quantity("meridional Cauchy stress at the first end, over mu", words="stress at first"),
+    "stress_last": Quantity("meridional Cauchy stress at the last end, over mu", words="stress at last"),
     "state_energy": Quantity("energy that orders the equilibria, over mu T R0^2"),
     "state_stable": Quantity("whether each equilibrium is stable (1 or 0)"),
     "upright_at_start": Quantity("whether the branch starts stable against one wave around the axis (1 or 0)"),

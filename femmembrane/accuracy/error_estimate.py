@@ -21,9 +21,10 @@ from ..solve.banded import negative_among
 from ..solve.controls import CONTROLS, control_kind
 from ..solve.finer_space import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
-from ..solve.state import State
+from ..solve.state import State, displacement, distance
 from ..solve.state_resolution import unresolved
 from ..solve.wellposed import ill_posed
+from ..stability.profile import profile_at
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import axisymmetric_verdict
 
@@ -60,10 +61,14 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     if found is None:
         return _without(control, values, method, reason)
     better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
-    return _compared(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better), method, reason)
+    errors = _errors(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better))
+    errors["displacement"] = finer.space.unit * distance(finer, found.x, transferred(potential.space, x, finer.space))
+    return from_numbers(control, values, errors, method, reason)
 
 
 def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evaluation, verdicts: Mapping[str, Verdict]) -> dict[str, float]:
+    ends = potential.space.ends[[0, -1]]
+    stresses = profile_at(potential.scene, x, pressure, ends).mechanical[0]
     return {
         "pressure": float(pressure),
         "volume": evaluation.volume,
@@ -73,6 +78,9 @@ def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evalua
         "energy": evaluation.energy,
         "lambda_pressure": float(verdicts["pressure"].smallest_eigenvalue),
         "lambda_volume": float(verdicts["volume"].smallest_eigenvalue),
+        "displacement": potential.space.unit * displacement(potential, x),
+        "stress_first": float(stresses[0]),
+        "stress_last": float(stresses[1]),
     }
 
 
@@ -140,9 +148,8 @@ def _verdicts(
     return better, reason
 
 
-def _compared(control: str, values: Mapping[str, float], better: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
-    errors = {name: 0.0 if name == control else value - better[name] for name, value in values.items()}
-    return from_numbers(control, values, errors, method, reason)
+def _errors(control: str, values: Mapping[str, float], better: Mapping[str, float]) -> dict[str, float]:
+    return {name: 0.0 if name == control else value - better[name] for name, value in values.items()}
 
 
 def _without(control: str, values: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:

@@ -393,7 +393,7 @@ class Equilibrium:
         to : str or list of str
             Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
             Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
-            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: whatever is an SI number stays, a held pressure included.
+            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: SI numbers stay, a held pressure included.
         held : {"pressure", "volume", "center_height", "gas"}, optional
             Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
         r : array_like, optional

@@ -412,7 +412,12 @@ class Equilibrium:
         InputError
             For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
         SolveError
-            At a fold of what is held, where nothing has a derivative.
+            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+
+        Notes
+        -----
+        In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
+        border of the wrinkles passes a quadrature point.
 
         Examples
         --------

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, SolveError, Status, unknown_name
 from ..quantities import PROFILE, quantity
 from ..scene.run import GAS, PRESCRIBED
 from ..scene.variation import Scale
@@ -174,6 +174,8 @@ def _energy(moved: tuple[Scene, Array, float], name: str) -> float:
 def sensitivity_of(eq: Equilibrium, of: Any, to: Any, held: str | None, along: Along) -> Any:
     """See :meth:`.Equilibrium.sensitivity`."""
     quantities, known = _listed("of", of), _known(eq.scene, to)
+    if eq.status is Status.INTERPOLATED:
+        raise SolveError("an interpolated state is in no exact balance, and has no exact derivatives", status=Status.INTERPOLATED)
     potential, control = eq.potential, _control(eq, held)
     evaluation = potential.evaluate(eq.state, eq.pressure)
     rates = known.at_control(evaluation, eq.pressure, control)

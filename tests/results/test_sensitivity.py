@@ -372,6 +372,8 @@ def test_a_fold_has_no_derivative_at_what_is_stationary_there() -> None:
         fm.trace(branch.scene, until={"volume": 1.0}).sensitivity("limit_pressure", "material.ratio")
     with pytest.raises(fm.InputError, match="ask for them in two calls"):
         branch.sensitivity(["limit_pressure", "volume"], "material.ratio")
+    with pytest.raises(fm.SolveError, match="interpolated"):
+        branch.at(volume=1.0).sensitivity("pressure", "material.ratio")
 
 
 def test_a_multiple_eigenvalue_has_no_derivative() -> None:
@@ -445,3 +447,12 @@ def test_a_scale_of_a_scene_without_units_is_unknown() -> None:
     with pytest.raises(fm.InputError, match="unknown") as error:
         solved(fm.Scene(fm.MooneyRivlin(0.1), DISC), {"volume": 1.0}).sensitivity("pressure", "scales.thickness")
     assert error.value.key == "to"
+
+
+def test_wrinkles_that_come_and_go() -> None:
+    """In a tube that is wrinkled in part slopes change where the border of the wrinkles passes a quadrature point: a small step sees none."""
+    scene = fm.Scene(fm.Gent(30.0), fm.Cylinder(length=2.0, elements=16), tension_field=True)
+    eq = solved(scene, {"volume": 5.5})
+    parameter, h = Parameter(scene, "membrane.prestretch"), 1e-5
+    after, before = (solved(parameter.scene_at(1.0 + t), {"volume": 5.5}, eq).pressure for t in (h, -h))
+    assert eq.sensitivity("pressure", "membrane.prestretch", held="volume") == pytest.approx((after - before) / (2 * h), rel=1e-7)

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from .cost import Cost
     from .equilibria import Equilibria
     from .equilibrium import Equilibrium
-    from .error_estimate import ErrorEstimate
+    from .error_estimate import ErrorEstimate, PlaceEstimate
     from .folds import FoldCurve
+    from .special_point import SpecialPoint
     from .sweep import Sweep
     from .verdict import Verdict
     from .vibration import Vibration
@@ -88,6 +89,14 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     from ..accuracy.error_estimate import estimate_errors
 
     return estimate_errors(potential, x, pressure, control, verdicts)
+
+
+def estimate_place(point: SpecialPoint) -> PlaceEstimate:
+    """See :func:`femmembrane.accuracy.place_estimate.estimate_place`."""
+    from ..accuracy.place_estimate import estimate_place
+
+    eq = point.equilibrium
+    return estimate_place(eq.potential, eq.state, eq.pressure, point.kind, point.azimuthal)
 
 
 def eigenvalue_rates(

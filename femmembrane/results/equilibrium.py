@@ -392,7 +392,8 @@ class Equilibrium:
             ``_pa``, ``_m``, ... as well, while the scales stay.
         to : str or list of str
             Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
-            Numbers that go with one, as other moduli of Ogden's material do, go with it here too.
+            Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
+            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: SI numbers stay, a held pressure included.
         held : {"pressure", "volume", "center_height", "gas"}, optional
             Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
         r : array_like, optional
@@ -411,7 +412,12 @@ class Equilibrium:
         InputError
             For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
         SolveError
-            At a fold of what is held, where nothing has a derivative.
+            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+
+        Notes
+        -----
+        In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
+        border of the wrinkles passes a quadrature point.
 
         Examples
         --------

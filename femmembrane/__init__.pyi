@@ -65,6 +65,7 @@ from .results.error_estimate import Deviation as Deviation
 from .results.error_estimate import ErrorEstimate as ErrorEstimate
 from .results.folds import Cusp as Cusp
 from .results.folds import FoldCurve as FoldCurve
+from .results.postbuckling import Postbuckling as Postbuckling
 from .results.special_point import Jump as Jump
 from .results.special_point import SpecialPoint as SpecialPoint
 from .results.store import load as load

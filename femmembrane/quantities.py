@@ -204,6 +204,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     "error": Quantity("uncertainty of the special point's location"),
     "tangent": Quantity("direction of the branch on which it was found, in the unknowns and the pressure"),
     "azimuthal": Quantity("number of waves around the axis of the instability that sets in", type=int),
+    "postbuckling": Quantity("whether it sets in gradually (supercritical) or with a jump (subcritical) at a held volume", type=str),
+    "postbuckling_coefficient": Quantity("its coefficient b of Koiter at a held volume, over mu T R0^2", words="coefficient b"),
     "trace_border": Quantity("softest displacement at the last point of a trace over a number"),
     "trace_sigma": Quantity("arc length, or load, at the last points of the path"),
     "trace_point": Quantity("state and pressure at the last points of the path"),

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .equilibrium import Equilibrium
     from .error_estimate import ErrorEstimate
     from .folds import FoldCurve
+    from .postbuckling import Postbuckling
     from .sweep import Sweep
     from .verdict import Verdict
     from .vibration import Vibration
@@ -66,6 +67,13 @@ def natural_frequencies(potential: Potential, x: Array, pressure: float, n: int,
     from ..stability.frequencies import natural_frequencies
 
     return natural_frequencies(potential, x, pressure, n, count, control)
+
+
+def postbuckling(onset: Equilibrium, azimuthal: int) -> Postbuckling:
+    """See :func:`femmembrane.stability.postbuckling.postbuckling`."""
+    from ..stability.postbuckling import postbuckling
+
+    return postbuckling(onset.potential, onset.state, onset.pressure, azimuthal, onset.enclosed)
 
 
 def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones:

@@ -60,6 +60,7 @@ class WaveUnknowns:
             rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
             rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
         self._values = space.table[: space.n_quadrature, :n_local]
+        self._slopes = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
         self._rows = rows
         self._table = self._products(PAIRS)
         kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
@@ -90,9 +91,11 @@ class WaveUnknowns:
         flat: Array = np.bincount(self._band_index, local.ravel(), self.n_free * depth + 1)  # type: ignore[assignment]  # weighted: floats
         return flat[:-1].reshape(self.n_free, depth).T
 
-    def integrate(self, density: Array) -> Array:
-        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions."""
+    def integrate(self, density: Array, slopes: Array | None = None) -> Array:
+        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions, and of their slopes."""
         local = np.concatenate([self._values.T @ part for part in density])
+        if slopes is not None:
+            local += np.concatenate([self._slopes.T @ part for part in slopes])
         for row, element in self.flips:
             local[row, element] *= -1
         total: Array = np.bincount(self.gather.ravel(), local.ravel(), self.n_free + 1)  # type: ignore[assignment]  # weighted: floats

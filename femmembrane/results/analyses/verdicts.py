@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ...scene import Scene
     from ..branch import Branch
     from ..equilibrium import Equilibrium
+    from ..special_point import SpecialPoint
 
 #: controls whose verdicts are printed of a scene that asks for none
 _PRINTED = ("pressure", "volume")
@@ -68,7 +69,16 @@ class Verdicts(EquilibriumAnalysis):
         return verdict.word if kind == "verdict" else float(verdict.smallest_eigenvalue)
 
     def point_columns(self, scene: Scene) -> Sequence[str]:
-        return ("azimuthal",) if scene.analysis.azimuthal_modes else ()
+        return ("azimuthal", "postbuckling", "postbuckling_coefficient") if scene.analysis.azimuthal_modes else ()
+
+    def point_value(self, point: SpecialPoint, column: str) -> Cell:
+        """Of other points than azimuthal onsets there is nothing after."""
+        if column == "azimuthal":
+            return point.azimuthal
+        after = point.postbuckling if point.azimuthal else None
+        if column == "postbuckling":
+            return after.kind if after else ""
+        return after.coefficient if after else np.nan
 
     # --- files
 

@@ -69,7 +69,10 @@ class Verdicts(EquilibriumAnalysis):
         return verdict.word if kind == "verdict" else float(verdict.smallest_eigenvalue)
 
     def point_columns(self, scene: Scene) -> Sequence[str]:
-        return ("azimuthal", "postbuckling", "postbuckling_coefficient") if scene.analysis.azimuthal_modes else ()
+        return ("azimuthal",) if scene.analysis.azimuthal_modes else ()
+
+    def found_columns(self, points: Sequence[SpecialPoint]) -> Sequence[str]:
+        return ("postbuckling", "postbuckling_coefficient") if any(point.azimuthal for point in points) else ()
 
     def point_value(self, point: SpecialPoint, column: str) -> Cell:
         """Of other points than azimuthal onsets there is nothing after."""

@@ -70,6 +70,8 @@ from .results.special_point import Jump as Jump
 from .results.special_point import SpecialPoint as SpecialPoint
 from .results.store import load as load
 from .results.sweep import Sweep as Sweep
+from .results.tipped import TippedBranch as TippedBranch
+from .results.tipped import TippedEquilibrium as TippedEquilibrium
 from .results.verdict import Verdict as Verdict
 from .results.vibration import Vibration as Vibration
 from .results.zones import Zone as Zone

@@ -47,6 +47,24 @@ N_LOCAL = 9
 _DATA = ("R", "J", "area", "inside", "pressure")
 
 
+def refusal(potential: Potential) -> str:
+    """Why the states beyond an onset of a scene are not computed; empty where they are."""
+    scene = potential.scene
+    if scene.tension_field:
+        return "the relaxed energy has no third derivatives on the borders of wrinkled zones"
+    if potential.tilts:
+        return "the magnetic energy depends on the slope of the membrane, and its derivatives beyond the second are not known"
+    if potential.charged is not None:
+        return "a total charge couples all points of the membrane"
+    if potential.space.lids and potential.space.spreads:
+        return "the lid across an end that moves in its plane does not stay flat"
+    if getattr(scene, "bending", False):
+        return "the stiffness of bending is known to second order only"
+    if getattr(scene, "obstacles", ()):
+        return "the membrane may touch an obstacle"
+    return ""
+
+
 class SurfaceSeries:
     """Taylor series of a potential about one axisymmetric state, at its quadrature points.
 
@@ -234,7 +252,7 @@ def derivatives_along() -> ca.Function:
     of_strain, of_place = ([data[i] for i in range(start, start + k)] for start in (n, n + k))
     projected = [data[i] for i in range(n + 2 * k, size)]
     y = ca.SX.sym("y", N_LOCAL)
-    h, square = _invariants(y, R, J)
+    h, square = invariants(y, R, J)
     h0, square0 = (ca.substitute(part, y, state) for part in (h, square))
     r, r0 = ca.sqrt(y[0] ** 2 + y[1] ** 2), state[0]
     volume = inside * y[2] * (y[3] * y[7] - y[4] * y[6])
@@ -252,7 +270,7 @@ def derivatives_along() -> ca.Function:
     return _rows([z], ca.substitute(rows, [y], [state]))
 
 
-def _invariants(y: ca.SX, R: ca.SX, J: ca.SX) -> tuple[ca.SX, ca.SX]:
+def invariants(y: ca.SX, R: ca.SX, J: ca.SX) -> tuple[ca.SX, ca.SX]:
     """h and y of the local variables."""
     A, B = y[3:6] / J, y[6:9] / R
     C11, C12, C22 = ca.dot(A, A), ca.dot(A, B), ca.dot(B, B)

@@ -25,7 +25,7 @@ from ..discretization.space import Space
 from ..errors import SolveError
 from ..kernels.bordered import SpringFactor
 from ..potential import Array, Evaluation, Potential
-from ..potential.surface import SurfaceSeries
+from ..potential.surface import SurfaceSeries, refusal
 from ..results.postbuckling import Postbuckling, Reduced
 from ..solve.banded import BandFactor, BorderedFactor
 from ..solve.controls import Gas
@@ -66,24 +66,6 @@ def postbuckling(potential: Potential, x: Array, pressure: float, n: int, gas: G
         return _Onset(potential, np.asarray(x, dtype=float), pressure, n).answer(gas)
     except (SpectrumError, SolveError, np.linalg.LinAlgError) as error:
         return Postbuckling(n, str(error))
-
-
-def refusal(potential: Potential) -> str:
-    """Why the states beyond an onset of a scene are not computed; empty where they are."""
-    scene = potential.scene
-    if scene.tension_field:
-        return "the relaxed energy has no third derivatives on the borders of wrinkled zones"
-    if potential.tilts:
-        return "the magnetic energy depends on the slope of the membrane, and its derivatives beyond the second are not known"
-    if potential.charged is not None:
-        return "a total charge couples all points of the membrane"
-    if potential.space.lids and potential.space.spreads:
-        return "the lid across an end that moves in its plane does not stay flat"
-    if getattr(scene, "bending", False):
-        return "the stiffness of bending is known to second order only"
-    if getattr(scene, "obstacles", ()):
-        return "the membrane may touch an obstacle"
-    return ""
 
 
 class _Onset:

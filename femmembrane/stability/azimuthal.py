@@ -28,7 +28,6 @@ from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
 from .verdict import against, short_wave_verdict, slack_all_over, slack_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
 
-
 #: smallest eigenvalue at a located onset, over the terms that cancel in it
 _AT_ONSET = 1e-5
 

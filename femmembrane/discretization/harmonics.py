@@ -6,6 +6,7 @@ A surface with n-fold symmetry about the axis that is symmetric in the plane the
 
 in (e_r, e_theta, e_z), with functions a_j, c_j, b_j of the meridian. What each harmonic may do at the ends is what a perturbation with j n
 waves may do there (:func:`supports_of_waves`). Unknowns are interleaved node by node, so that matrices stay banded, 3 K + 2 times as wide.
+Perturbations that are odd in the mirror have sines for cosines and the reverse, and of those without waves the torsion c_0 alone.
 """
 
 from __future__ import annotations
@@ -69,6 +70,8 @@ class Harmonics:
         n >= 1.
     order : int
         K >= 1.
+    odd : bool
+        Whether these are the perturbations that a mirror in the plane theta = 0 turns round.
 
     Attributes
     ----------
@@ -81,9 +84,9 @@ class Harmonics:
         Unknown of each node; n_free stands for what is held.
     """
 
-    def __init__(self, space: Space, waves: int, order: int) -> None:
-        self.space, self.waves, self.order = space, waves, order
-        self.fields = [(j, f) for j in range(order + 1) for f in (RADIAL, AROUND, VERTICAL) if j or f != AROUND]
+    def __init__(self, space: Space, waves: int, order: int, odd: bool = False) -> None:
+        self.space, self.waves, self.order, self.odd = space, waves, order, odd
+        self.fields = [(j, f) for j in range(order + 1) for f in (RADIAL, AROUND, VERTICAL) if j or (f == AROUND) == odd]
         n_angles = max(_ANGLES * order, _LEAST_ANGLES)
         self.angles: Array = np.pi * (np.arange(n_angles) + 0.5) / n_angles
         self._number()
@@ -96,22 +99,35 @@ class Harmonics:
         held = {kind: supports_of_waves(space, kind) for kind in range(3)}
         for column, (j, field) in enumerate(self.fields):
             free[:, column] = held[min(j * self.waves, 2)][0][:, field]
+            if not j and self.odd:
+                free[:, column] = self._may_turn()
         self.n_free = int(free.sum())
         self.numbers: NDArray[np.int64] = np.full(free.shape, self.n_free, dtype=np.int64)
         self.numbers[free] = np.arange(self.n_free)
         self._flips: list[tuple[int, int]] = []
-        if self.waves == 1:
+        if self.waves == 1:  # of odd ones c = a, which no sign is needed for
             radial, around = self.fields.index((1, RADIAL)), self.fields.index((1, AROUND))
             for node in held[1][1]:
                 self.numbers[node, around] = self.numbers[node, radial]
-                self._flips.append((around * n_local, 0) if node == 0 else (around * n_local + n_local - 1, space.n_elements - 1))
+                if not self.odd:
+                    self._flips.append((around * n_local, 0) if node == 0 else (around * n_local + n_local - 1, space.n_elements - 1))
         self.gather = np.concatenate([self.numbers[local, column] for column in range(len(self.fields))])
         self.half_bandwidth = band_of(self.gather, self.n_free)
         #: unknown of a coefficient without waves, by its number in the space
         self.without_waves: NDArray[np.int64] = np.empty(space.n_free, dtype=np.int64)
-        for column in (RADIAL, 1):
+        for column in () if self.odd else (RADIAL, 1):
             own, known = space.numbers[:, column], self.numbers[:, column]
             self.without_waves[own[own < space.n_free]] = known[own < space.n_free]
+
+    def _may_turn(self) -> NDArray[np.bool_]:
+        """The nodes that may turn about the axis without waves: none on the axis or where both displacements in the plane are held."""
+        space = self.space
+        free = np.ones(space.n_nodes, dtype=bool)
+        for node, support, on_axis in zip(space.nodes[[0, -1]].tolist(), space.supports, space.on_axis.tolist(), strict=False):
+            free[node] = not on_axis and "u" not in support.held
+        if all("u" not in support.held for support in space.supports):  # nothing resists a turn of the whole
+            free[space.nodes[space.widest]] = False
+        return free
 
     def _tabulate(self) -> None:
         space, n = self.space, self.waves
@@ -121,6 +137,8 @@ class Harmonics:
         turn = np.zeros((N_LOCAL, n_angles, n_fields, 2))  # of the local variables by value and slope of each field
         for column, (j, field) in enumerate(self.fields):
             cos, sin, m = np.cos(j * self.angles), np.sin(j * self.angles), j * n
+            if self.odd:  # the derivatives of sin and cos have the signs of those of cos and -sin
+                cos, sin, m = sin, cos, -m
             turn[field, :, column, 0] = turn[3 + field, :, column, 1] = sin if field == AROUND else cos
             if field == RADIAL:
                 turn[6, :, column, 0], turn[7, :, column, 0] = -m * sin, cos
@@ -233,6 +251,18 @@ class Harmonics:
                 found[self.numbers[free, column]] = own[numbers[free, field]]
         return found[:-1]
 
+    def turned(self, x: Array, odd: Harmonics) -> Array:
+        """The odd perturbation that turns a state with waves about the axis: its derivative with respect to theta."""
+        found = np.zeros(odd.n_free + 1)
+        for column, (j, field) in enumerate(self.fields):
+            if (j, field) in odd.fields:
+                own, other = self.numbers[:, column], odd.numbers[:, odd.fields.index((j, field))]
+                free = (own < self.n_free) & (other < odd.n_free)
+                if field == AROUND and self._flips:  # c = -a there, and both have become j n a
+                    free &= own != self.numbers[:, column - 1]
+                found[other[free]] = j * self.waves * (1.0 if field == AROUND else -1.0) * x[own[free]]
+        return found[:-1]
+
     def sizes(self, x: Array) -> Array:
         """Root mean square of each harmonic over the reference area, shape (K + 1,); of the last ones the error of K follows."""
         local, area = self.local(x), self.space.area_weights
@@ -244,6 +274,6 @@ class Harmonics:
 
 
 @lru_cache(maxsize=32)
-def harmonics_of(space: Space, waves: int, order: int) -> Harmonics:
+def harmonics_of(space: Space, waves: int, order: int, odd: bool = False) -> Harmonics:
     """Of a space, built once."""
-    return Harmonics(space, waves, order)
+    return Harmonics(space, waves, order, odd)

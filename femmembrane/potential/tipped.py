@@ -79,6 +79,10 @@ class TippedEvaluation:
             self._band = self.potential.harmonics.band(self._second)
         return self._band
 
+    def odd_band(self, odd: Harmonics) -> Array:
+        """The same for the perturbations that are odd in the mirror of the state."""
+        return odd.band(self._second)
+
 
 class TippedPotential:
     """The potential of a scene in displacements with harmonics 0, n, ... K n around the axis.

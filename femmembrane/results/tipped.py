@@ -117,9 +117,10 @@ class TippedEquilibrium:
         return answer
 
     def verdict(self, control: str = "volume") -> Verdict:
-        """Stability against perturbations with the symmetry of the state: harmonics 0, n, ... K n, mirrored in the plane theta = 0.
+        """Stability against perturbations with 0, n, ... K n waves around the axis.
 
-        Perturbations without this symmetry are not tested.
+        A turn of the waves about the axis costs nothing, and counts as no perturbation. With n = 1 these are all perturbations up to K
+        waves; with n > 1 others are not tested. Where a principal stress is compressive, ever shorter waves have ever lower eigenvalues.
 
         Parameters
         ----------

@@ -130,9 +130,43 @@ def test_the_tipped_branch_turns_back_at_a_fold_of_its_own() -> None:
     assert fold.volume == pytest.approx(FOLD, abs=3e-4)
     assert fold.volume == pytest.approx(0.46294, abs=3e-5)  # recorded 2026-11-28 with 12 harmonics
     before, after = branch()[3], branch()[-1]
-    assert before.verdict("volume").stable is False
-    assert "others were not tested" in before.verdict("volume").reason
+    assert [before.verdict("volume").word, before.verdict("volume").negative_directions] == ["unstable", 1]
+    assert "with up to 8 waves around the axis" in before.verdict("volume").reason
+    # the eigenvalue at a held volume passes zero at the fold, and the states beyond it are those that the membrane jumps to
+    values = [(eq.verdict("volume").smallest_eigenvalue, eq.volume) for eq in branch()[1:15]]
+    turned = next(k for k, (value, _) in enumerate(values) if value > 0)
+    assert max(volume for _, volume in values[turned - 1 : turned + 1]) == pytest.approx(fold.volume, abs=1e-4)
+    assert branch()[turned + 3].verdict("volume").stable is True
+    assert branch()[turned + 3].verdict("pressure").stable is False
     assert after.volume == pytest.approx(upright(0.3).volume, rel=1e-13)
+
+
+def test_a_turn_about_the_axis_costs_nothing_and_counts_as_none() -> None:
+    eq = branch()[8]
+    odd = harmonics_of(eq.tipped.space, 1, eq.harmonics, odd=True)
+    turn = eq.tipped.harmonics.turned(eq.state, odd)
+    band = eq.tipped.evaluate(eq.state, eq.pressure).odd_band(odd)
+    forces = band_product(np.abs(band), odd.half_bandwidth, np.abs(turn))
+    assert np.abs(band_product(band, odd.half_bandwidth, turn)).max() < 1e-11 * forces.max()
+    assert np.abs(turn).max() > 1e-3
+
+
+def test_odd_perturbations_of_a_round_state_are_the_even_ones_turned() -> None:
+    eq = upright(0.3)
+    tipped = tipped_potential(eq.potential, 1, 3)
+    evaluation = tipped.evaluate(tipped.harmonics.lifted(eq.state), eq.pressure)
+    odd = harmonics_of(eq.potential.space, 1, 3, odd=True)
+    for n in (1, 2, 3):
+        operator = azimuthal_operator(eq.potential, eq.state, eq.pressure, n)
+        mode = operator.pencil().block_iterations()
+        x = odd.of_mode(n, operator.numbering, mode)
+        sign = np.ones(odd.n_free)  # (a cos, c sin, b cos) turned by a quarter wave is (a sin, -c cos, b sin)
+        for column, (_, field) in enumerate(odd.fields):
+            if field == 1:
+                shared = odd.numbers[:, column] == odd.numbers[:, max(column - 1, 0)]
+                sign[odd.numbers[~shared & (odd.numbers[:, column] < odd.n_free), column]] = -1.0
+        own = (sign * x) @ band_product(evaluation.odd_band(odd), odd.half_bandwidth, sign * x)
+        assert own == pytest.approx(mode @ band_product(operator.band, operator.half_bandwidth, mode) / 2, rel=1e-7)
 
 
 @pytest.mark.parametrize("height", FALLS)

@@ -66,10 +66,13 @@ from .results.error_estimate import ErrorEstimate as ErrorEstimate
 from .results.error_estimate import PlaceEstimate as PlaceEstimate
 from .results.folds import Cusp as Cusp
 from .results.folds import FoldCurve as FoldCurve
+from .results.postbuckling import Postbuckling as Postbuckling
 from .results.special_point import Jump as Jump
 from .results.special_point import SpecialPoint as SpecialPoint
 from .results.store import load as load
 from .results.sweep import Sweep as Sweep
+from .results.tipped import TippedBranch as TippedBranch
+from .results.tipped import TippedEquilibrium as TippedEquilibrium
 from .results.verdict import Verdict as Verdict
 from .results.vibration import Vibration as Vibration
 from .results.zones import Zone as Zone

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import whole
+from ..discretization.harmonics import RADIAL, VERTICAL
 from ..discretization.space import Space
 from ..potential import Array, Potential
 from .mode_resolution import small_eigenvalue
 from .rigid_motions import pencil_of, rigid_part
 from .second_variation import LocalResponse, response_at_quadrature, second_variation
 from .spectrum import Pencil
-from .wave_unknowns import RADIAL, VERTICAL, WaveUnknowns, azimuthal_shape, wave_unknowns
+from .wave_unknowns import WaveUnknowns, azimuthal_shape, wave_unknowns
 
 #: departure from a rigid motion, relative to its size, below which the turned material of a sphere has only turned as a whole
 _ROUND = 1e-6

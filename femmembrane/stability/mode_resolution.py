@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..discretization.space import HESSIAN_PAIRS, Space
 from ..potential import Array, Evaluation
+from .bending import Bending
 
 #: an eigenvalue is small below this part of a typical one: about the eigenvalue of a membrane of the same area under a tension of one shear
 #: modulus
@@ -52,6 +53,11 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
     return float(mode + of_state * _size(times @ np.abs(products, out=products)))
 
 
+def unresolved_bending(space: Space, inside: Array, joints: float, of_state: float) -> float:
+    """The same of the bending of a mode, from its energies at the points and at the joints: a mode that is resolved does not jump."""
+    return _size(space.highest @ inside) + joints + of_state * _size(inside)
+
+
 def unresolved_stress(space: Space, stress: Array) -> float:
     """Relative part of the stresses of a state that the mesh does not resolve. Errors of the pressure and of moduli are smaller."""
     integrand = (stress[0] + stress[1]).reshape(space.R.shape)
@@ -65,12 +71,13 @@ def _size(values: Array) -> float:
     return float(np.add.reduce(np.abs(values), axis=None))
 
 
-def unresolved_axisymmetric(space: Space, evaluation: Evaluation, mode: Array) -> float:
+def unresolved_axisymmetric(space: Space, evaluation: Evaluation, mode: Array, bending: Bending | None = None) -> float:
     """:func:`unresolved` for an axisymmetric mode."""
     shape = (space.n_quadrature, space.n_elements)
     local = evaluation.elements.at_quadrature(np.ascontiguousarray(mode)).reshape(4, *shape)
     of_state = evaluation.once("unresolved stress", lambda state: unresolved_stress(space, state.stress))
-    return unresolved(space, evaluation.stiffness_density.reshape(-1, *shape), HESSIAN_PAIRS, local, of_state)
+    part = unresolved(space, evaluation.stiffness_density.reshape(-1, *shape), HESSIAN_PAIRS, local, of_state)
+    return part if bending is None else part + unresolved_bending(space, *bending.densities(mode), of_state)
 
 
 @lru_cache(maxsize=8)

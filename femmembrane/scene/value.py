@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -144,6 +144,8 @@ class Scene:
     chamber: Chamber | None = None
     electric: Electric | None = None
     bending: bool = False
+    #: whether R0/T was given, by itself or by scales
+    _thickness_given: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -342,9 +344,7 @@ class Scene:
         for name, value in changes.items():
             if name not in known:
                 raise InputError(name, value, unknown_name(name, name, known).allowed)
-        if changes.get("scales") is not None:
-            changes.setdefault("radius_to_thickness", None)
-        elif not self._thickness_given:  # the default is no thickness that bending may follow from
+        if changes.get("scales") is not None or not self._thickness_given:  # a default is nothing that bending may follow from
             changes.setdefault("radius_to_thickness", None)
         if getattr(changes.get("mesh"), "open", False):
             changes.setdefault("degree", None)

@@ -6,7 +6,7 @@ ever lower eigenvalues, and none is the lowest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -116,7 +116,17 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     sharp = not potential.scene.tension_field and operator.bending is None
     false = sharp and any(least_stress(evaluation, component, supporting_all) for component in (0, 1))
     part = np.inf if false else _unresolved(potential.space, operator, found.mode)
-    return verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
+    verdict = verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
+    return verdict if operator.bending is None else replace(verdict, wavelength=_wavelength(operator, found.mode))
+
+
+def _wavelength(operator: AzimuthalOperator, mode: Array) -> float:
+    """The length of a wave on the circle where the normal displacement of a mode is largest, as deformed."""
+    r = operator.response
+    local = wave_unknowns(operator.space, min(operator.n, 2)).local(mode).reshape(3, operator.space.degree + 1, -1)
+    a, _, b = operator.space.shape_functions(operator.space.points)[0] @ local
+    largest = np.argmax(np.abs(r.t_rho * b - r.t_z * a))
+    return float(2 * np.pi * r.rho.ravel()[largest] / operator.n)
 
 
 def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float:

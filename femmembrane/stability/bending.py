@@ -134,6 +134,19 @@ class BendingForm:
         d11, d12, d22, d66 = self._inside.stiffness
         return bool(((d11 > 0) & (d66 > 0) & (d11 * d22 > d12**2)).all())
 
+    @property
+    def moduli(self) -> Array:
+        """D_11, D_12, D_22 and D_66 times (T/R0)^2/12 l3^2, per reference area."""
+        space = self.space
+        return self._inside.stiffness / (2 * np.pi * space.R * np.hypot(space.R_x, space.Z_x))
+
+    @property
+    def curvatures(self) -> tuple[Array, Array]:
+        """The principal curvatures of the state, along the meridian and around the axis, without their signs."""
+        inside = self._inside
+        turn = _derivative(tuple(self.space.points.tolist())) @ np.stack([inside.t_rho, inside.t_z])
+        return np.hypot(*turn) / inside.speed, np.abs(inside.t_z) / inside.rho
+
     def at(self, n: int) -> Bending:
         """The form at n waves."""
         kind = min(n, 2)
@@ -153,7 +166,8 @@ class BendingForm:
         jumps, moments, penalties = self._joints(pattern.joints, phi, moment)
         outer = np.einsum("aj,bj->abj", jumps, moments)
         joint = outer + outer.transpose(1, 0, 2) + np.einsum("aj,bj,j->abj", jumps, jumps, penalties)
-        total = np.bincount(pattern.index, np.concatenate([local.ravel(), joint.ravel()]), pattern.size + 1)
+        entries = np.concatenate([local.ravel(), joint.ravel()])
+        total: Array = np.bincount(pattern.index, entries, pattern.size + 1)  # type: ignore[assignment]  # weighted: floats
         kd = pattern.half_bandwidth
         band = np.asfortranarray(total[:-1].reshape(layout.n_free, 3 * kd + 1).T)
         return Bending(kd, band, self.positive, curvatures, stiffness, jumps, moments, penalties, layout, pattern.joints)

@@ -54,7 +54,9 @@ def natural_frequencies(
     evaluation = potential.evaluate(x, pressure)
     bad = unbounded_below(potential, evaluation, operator.bending)
     # a hoop stress sets no axisymmetric wave in motion
-    wrinkles = [wrinkle.where for wrinkle in short_waves(potential, evaluation, operator.bending)] if operator.n else [str(bad)] if bad else []
+    wrinkles = (
+        [wrinkle.where for wrinkle in short_waves(potential, evaluation, operator.bending)] if operator.n else [str(bad)] if bad else []
+    )
     if wrinkles and slack_all_over(evaluation):
         raise SolveError(f"no natural frequencies: {SLACK_ALL_OVER}", status=Status.SLACK)
     if wrinkles:

@@ -101,10 +101,7 @@ class Analysis:
         extra = sequence("analysis.extra", self.extra, _NAMES)
         for k, name in enumerate(stability):
             choice(f"analysis.stability[{k}]", name, VERDICTS)
-        modes = tuple(
-            n if isinstance(n, str) and n == ALL else whole(f"analysis.azimuthal_modes[{k}]", n, most=MAX_WAVES)
-            for k, n in enumerate(modes)
-        )
+        modes = tuple(_waves(f"analysis.azimuthal_modes[{k}]", n) for k, n in enumerate(modes))
         for k, name in enumerate(extra):
             if not isinstance(name, str) or not name:
                 raise InputError(f"analysis.extra[{k}]", name, _NAMES)
@@ -124,6 +121,10 @@ class Analysis:
     def zone_criterion(self) -> str:
         """The stresses that tell zones apart: those asked for, else the total ones."""
         return self.wrinkling or "total"
+
+
+def _waves(key: str, n: Any) -> int | str:
+    return n if isinstance(n, str) and n == ALL else whole(key, n, most=MAX_WAVES)
 
 
 _MODES = 'a list of whole numbers >= 1 is allowed, or "all"'

@@ -82,9 +82,8 @@ def _worst_verdict(potential: Potential, x: Array, pressure: float, evaluation: 
     except SpectrumError as error:
         return Verdict(None, np.nan, np.nan, control, 1, None, f"not decided: {error}")
     verdict = first if n == 1 else checked_verdict(potential, x, pressure, evaluation, control, n)
-    return replace(
-        verdict, reason=f"{verdict.reason}; n = {n} has the lowest eigenvalue found among 1 to {limit} waves, the most that matter"
-    )
+    found = f"n = {n} has the lowest eigenvalue found among 1 to {limit} waves, the most that matter"
+    return replace(verdict, reason=f"{verdict.reason}; {found}")
 
 
 def _verdict(

@@ -5,15 +5,15 @@ Waves with the wave numbers k_1 and k_2 = n/rho, short beside all else, cost per
     f = s_1 k_1^2 + s_2 k_2^2 + d_11 k_1^4 + (2 d_12 + d_66) k_1^2 k_2^2 + d_22 k_2^4 - g
 
 with the stresses s_i that support the sheet, the stiffness d_ij of :mod:`.bending`, and g, which bounds what the position alone can gain:
-the curvature of the field's energy, the pressure on a curved surface, |P| l1 l2 (|kappa_1| + |kappa_2|), and the waves in the plane that the
-pressure drives, (P l1 l2)^2/(4 A). The term of k_1^4 at its worst is worth s_1^2/(4 d_11) where s_1 < 0, so that f > L, an eigenvalue over
-the mass t, wherever ::
+the curvature of the field's energy, the pressure on a curved surface, |P| l1 l2 (|kappa_1| + |kappa_2|), and the waves in the plane that
+the pressure drives, (P l1 l2)^2/(4 A). The term of k_1^4 at its worst is worth s_1^2/(4 d_11) where s_1 < 0, so that f > L, an eigenvalue
+over the mass t, wherever ::
 
     d_22 k_2^4 - max(-s_2, 0) k_2^2 > g + L t + s_1^2/(4 d_11),        or without bending    s_2 k_2^2 > g + L t
 
 So no n beyond the largest rho k_2 over the membrane has an eigenvalue below L. The numbers up to there are searched: the first ones all,
-others in steps of a few per cent, between which eigenvalues change little, and around the lowest every one. By inertia it is counted at each
-whether an eigenvalue lies below the lowest that was found; if so it becomes the lowest.
+others in steps of a few per cent, between which eigenvalues change little, and around the lowest every one. By inertia it is counted at
+each whether an eigenvalue lies below the lowest that was found; if so it becomes the lowest.
 """
 
 from __future__ import annotations

@@ -423,8 +423,8 @@ class TraceRun(Run[Branch]):
     def _worst_onset(self, segment: Segment[BranchPoint], top: float) -> list[SpecialPoint]:
         """The point, if any, where the first of all numbers of waves loses stability, or the last regains it.
 
-        The number that is the worst at the unstable end has an onset. Where another number is unstable at that onset, its own lies nearer to
-        the stable end, and takes its place.
+        The number that is the worst at the unstable end has an onset. Where another number is unstable at that onset, its own lies nearer
+        to the stable end, and takes its place.
         """
         ends = [equilibrium.verdict(azimuthal=ALL) for equilibrium in self.found[-2:]]
         if not ends[0].smallest_eigenvalue * ends[1].smallest_eigenvalue < 0:  # False where either is NaN

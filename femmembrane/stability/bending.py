@@ -216,20 +216,23 @@ def _with_turning(space: Space, rho: Array, rho_x: Array, eta_x: Array, stiffnes
     """Derivatives of the tangent are those of the polynomial through the points of an element."""
     speed = np.hypot(rho_x, eta_x)
     derive = _derivative(tuple(space.points.tolist()))
-    return Geometry(rho, speed, derive @ speed, rho_x / speed, eta_x / speed, stiffness)
+    t_rho, t_z = rho_x / speed, eta_x / speed
+    return Geometry(rho, speed, t_rho * (derive @ rho_x) + t_z * (derive @ eta_x), t_rho, t_z, stiffness)
 
 
 def _at_ends(space: Space, inside: Geometry) -> Geometry:
     """Both ends of each element, by polynomials through its points; the stiffness vanishes where the meridian meets the axis."""
     ends = np.array([0.0, 1.0])
     to_ends = lagrange(np.repeat(space.points[:, None], 2, axis=1), ends).T
-    rho_x, eta_x = to_ends @ (inside.speed * inside.t_rho), to_ends @ (inside.speed * inside.t_z)
+    derive = _derivative(tuple(space.points.tolist()))
+    slopes = inside.speed * inside.t_rho, inside.speed * inside.t_z
+    (rho_x, rho_xx), (eta_x, eta_xx) = ((to_ends @ part, to_ends @ derive @ part) for part in slopes)
     rho, stiffness = to_ends @ inside.rho, np.stack([to_ends @ part for part in inside.stiffness])
     speed = np.hypot(rho_x, eta_x)
     for k in (0, -1):
         if space.on_axis[k] and not space.closed:
             rho[k, k], stiffness[:, k, k] = 1.0, 0.0
-    return Geometry(rho, speed, to_ends @ inside.turning, rho_x / speed, eta_x / speed, stiffness)
+    return Geometry(rho, speed, (rho_x * rho_xx + eta_x * eta_xx) / speed, rho_x / speed, eta_x / speed, stiffness)
 
 
 @lru_cache(maxsize=8)

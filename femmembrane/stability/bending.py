@@ -160,12 +160,10 @@ class BendingForm:
             for row, element in layout.flips:
                 rows[..., row, element] *= -1
         stiffness = self._inside.stiffness * (self.space.weights[:, :1] / (2 * np.pi))
-        local = np.einsum("iqae,iqbe,iqe->abe", curvatures, curvatures, stiffness[[0, 2, 3]], optimize=True)
-        mixed = np.einsum("qae,qbe,qe->abe", curvatures[0], curvatures[1], stiffness[1], optimize=True)
-        local += mixed + mixed.transpose(1, 0, 2)
+        local = _products(curvatures, stiffness)
         jumps, moments, penalties = self._joints(pattern.joints, phi, moment)
-        outer = np.einsum("aj,bj->abj", jumps, moments)
-        joint = outer + outer.transpose(1, 0, 2) + np.einsum("aj,bj,j->abj", jumps, jumps, penalties)
+        outer = jumps[:, None] * (moments + penalties / 2 * jumps)
+        joint = outer + outer.transpose(1, 0, 2)
         entries = np.concatenate([local.ravel(), joint.ravel()])
         total: Array = np.bincount(pattern.index, entries, pattern.size + 1)  # type: ignore[assignment]  # weighted: floats
         kd = pattern.half_bandwidth
@@ -261,6 +259,15 @@ def _curvatures(g: Geometry, tables: tuple[Array, Array, Array], n: int) -> Arra
             k12 = n * normal * (t / rho * value - per_length) / rho
         rows.append(np.stack([k11, k22, k12]))
     return np.concatenate(rows, axis=2)
+
+
+def _products(curvatures: Array, stiffness: Array) -> Array:
+    """The matrices of the elements, shape (n_local, n_local, n_elements)."""
+    k11, k22, k12 = curvatures
+    d11, d12, d22, d66 = stiffness[:, :, None]
+    moments = np.stack([d11 * k11 + d12 * k22, d12 * k11 + d22 * k22, d66 * k12])
+    first, second = (part.transpose(3, 2, 0, 1).reshape(part.shape[3], part.shape[2], -1) for part in (curvatures, moments))
+    return np.asarray((first @ second.transpose(0, 2, 1)).transpose(1, 2, 0))
 
 
 def _turns(g: Geometry, tables: tuple[Array, Array, Array]) -> Array:

@@ -152,9 +152,9 @@ def short_waves(potential: Potential, evaluation: Evaluation, bending: Bending |
     """Where ever shorter waves with n >= 1 waves around the axis have ever lower eigenvalues; empty if nowhere.
 
     A principal mechanical stress is compressive, or does not hold the sheet against a field that turns it, so that the Legendre-Hadamard
-    condition fails. In a tension field no stress is
-    compressive. There the meridional stress may vanish; without hoop stress the operator of one n is as good as any. Bending puts an end to
-    waves out of the surface, and leaves those in the plane of the sheet, of which a stress says nothing.
+    condition fails. In a tension field no stress is compressive. There the meridional stress may vanish; without hoop stress the operator
+    of one n is as good as any. Bending puts an end to waves out of the surface, and leaves those in the plane of the sheet, of which a
+    stress says nothing.
     """
     if bending is not None and bending.positive:
         return _in_plane(potential, evaluation)
@@ -166,6 +166,9 @@ def short_waves(potential: Potential, evaluation: Evaluation, bending: Bending |
         zone = compressed(potential, evaluation, component, supporting_all)
         if zone is not None:
             doubt = "" if zone.confirmed else f" ({UNCONFIRMED})"
+            if zone.pulled:
+                found.append(ShortWaves(str(zone), zone.confirmed))
+                continue
             what = f"{name} stress not held against the field" if zone.turned else f"{name} stress compressive"
             found.append(ShortWaves(f"{what} at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
     return found or _in_plane(potential, evaluation)

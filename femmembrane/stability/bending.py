@@ -38,6 +38,7 @@ from ..discretization.elements import lagrange
 from ..discretization.space import Space
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Potential
+from ..solve.banded import band_product
 from ..solve.pull_in import moduli
 from .second_variation import response_at_quadrature
 from .wave_unknowns import WaveUnknowns, wave_unknowns
@@ -96,6 +97,10 @@ class Bending:
     def added_to(self, band: Array, half_bandwidth: int) -> Array:
         """A band matrix of another half bandwidth plus this one."""
         return widened(band, half_bandwidth, self.half_bandwidth) + self.band
+
+    def energy(self, mode: Array) -> float:
+        """Twice the energy of a mode."""
+        return float(mode @ band_product(self.band, self.half_bandwidth, mode))
 
     def densities(self, mode: Array) -> tuple[Array, float]:
         """The energy of a mode at the quadrature points, times the weights and twice, and the sum of the sizes of what joints add."""

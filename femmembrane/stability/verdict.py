@@ -16,7 +16,7 @@ from ..solve.wellposed import IllPosed, apparent, ill_posed, stress_free
 from .bending import Bending, bending_form, widened
 from .mode_resolution import unresolved_axisymmetric
 from .rigid_motions import pencil_of
-from .spectrum import SmallestEigenvalue, smallest_of
+from .spectrum import Pencil, SmallestEigenvalue, smallest_of
 
 CONTROLS = ("pressure", "volume", "gas")
 #: what is said of a membrane without any tension
@@ -52,14 +52,21 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
+    found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, soft), guess)
+    shape = partial(mode_shape, potential.space)
+    # compression that finer meshes do not confirm says that the mesh cannot be trusted
+    unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode, bending)
+    return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
+
+
+def axisymmetric_pencil(
+    potential: Potential, evaluation: Evaluation, bending: Bending | None, constraint: Array | None, compliance: float
+) -> Pencil:
+    """K - lambda M of axisymmetric perturbations, with bending if given."""
     band, mass, kd = evaluation.band, potential.mass, potential.space.half_bandwidth
     if bending is not None:
         band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
-    found = smallest_of(pencil_of(band, mass, kd, constraint, soft, potential.rigid, evaluation.spring), guess)
-    shape = partial(mode_shape, potential.space)
-    # compression that finer meshes do not confirm says that the mesh cannot be trusted
-    unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode, bending)
-    return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
+    return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, evaluation.spring)
 
 
 def unbounded_below(potential: Potential, evaluation: Evaluation, bending: Bending | None) -> IllPosed | None:

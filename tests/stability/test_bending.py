@@ -465,3 +465,17 @@ def test_the_first_onset_of_any_number(tmp_path: Any) -> None:
     ours, theirs = (found[-1].verdict(azimuthal="all") for found in (branch, fm.load(tmp_path / "branch.nc")))
     assert (ours.azimuthal, ours.smallest_eigenvalue, ours.wavelength) == (theirs.azimuthal, theirs.smallest_eigenvalue, theirs.wavelength)
     assert theirs.reason == ours.reason
+
+
+@pytest.mark.parametrize("against", [{"control": "volume"}, {"azimuthal": 3}])
+def test_sensitivities_of_eigenvalues_have_bending(against: dict[str, Any]) -> None:
+    """Against central differences of the eigenvalue at a held height of the pole, where bending is a tenth of it."""
+    eq = fm.equilibrium(compressed(0.1, elements=12), center_height=0.6)
+    found = eq.sensitivity(of="eigenvalue", to="source.0.strength", held="center_height", **against)
+
+    def value(strength: float) -> float:
+        scene = eq.scene.replace(sources=[fm.Dipole(strength, -3.25)])
+        return float(fm.equilibrium(scene, center_height=0.6, start=eq).verdict(**against).smallest_eigenvalue)
+
+    step = 0.5
+    assert found == pytest.approx((value(400 + step) - value(400 - step)) / (2 * step), rel=1e-4)

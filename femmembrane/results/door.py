@@ -55,7 +55,7 @@ def checked_verdict(
     pressure: float,
     evaluation: Evaluation,
     control: str | None,
-    azimuthal: int,
+    azimuthal: int | str,
     guess: Array | None = None,
     compliance: float | None = None,
 ) -> Verdict:

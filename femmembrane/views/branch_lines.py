@@ -15,6 +15,7 @@ from ..quantities import PLACES, Units, axis_label, key_label
 from ..results.curve import half_way, turning
 from ..results.postbuckling import SUBCRITICAL, UNKNOWN
 from ..results.special_point import SpecialPoint
+from ..scene import ALL
 from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
@@ -291,10 +292,10 @@ def _draw_azimuthal(axes: Axes, branch: Branch, shown: _Shown) -> None:
     """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them, and for shorter waves."""
     words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
     lines = list(_lines(_segments(shown, words), lambda p: tuple(n for n, word in p.words.items() if word == "unstable")))
-    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), lost))
+    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), [n if isinstance(n, int) else 0 for n in lost]))
     for lost, line in lines:
         if lost:
-            named = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
+            named = new_label(axes, "unstable to azimuthal n = " + ", ".join("any" if n == ALL else str(n) for n in lost))
             grey = str(max(0.84 - 0.14 * order.index(lost), 0.4))
             axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=named)
 

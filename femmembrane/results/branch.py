@@ -378,6 +378,25 @@ class Branch(Sequence[Equilibrium]):
         """
         door.write_report(self, path, units)
 
+    def explore(self, path: str | PathLike[str], *, units: str = "scaled") -> None:
+        """Write one HTML page on which the branch is explored: click a state to see it in space with its verdicts, modes and zones.
+
+        The page needs no network, and has all that it shows: 1 MB for 80 states, and 2 MB for the library that draws them.
+
+        Parameters
+        ----------
+        path : path
+        units : {"scaled", "si"}
+            As for :meth:`plot`.
+
+        Raises
+        ------
+        InputError
+            For an empty branch, a file that cannot be written, SI units of a scene without scales, and where Plotly is not installed
+            (``pip install "femmembrane[explore]"``).
+        """
+        door.write_explorer(self, path, units)
+
     def cite(self) -> str:
         """BibTeX of what the computation used."""
         from .citations import cite

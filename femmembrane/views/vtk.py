@@ -169,6 +169,11 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array
     if found["r"].size < points:
         s = equilibrium.potential.space.node_parameters()
         found = equilibrium.profile(np.linspace(s[0], s[-1], points))
+    return finite_at_ends(found)
+
+
+def finite_at_ends(found: Mapping[str, Array]) -> dict[str, Array]:
+    """A profile in which a value that is not defined on the axis (0/0) is that of the place beside it."""
     profile = {key: np.array(values, dtype=np.float64) for key, values in found.items()}
     for values in profile.values():
         for end, beside in ((0, 1), (-1, -2)):

@@ -25,20 +25,11 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 #: tests that need a browser are left out where there is none
 needs_browser = pytest.mark.skipif(BROWSER is None or sys.platform == "win32", reason="no Chromium is installed")
 
-_FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-extensions",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--remote-debugging-pipe",
-]
+_FLAGS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync", "--disable-extensions"),
+    *("--disable-background-networking", "--disable-component-update", "--remote-debugging-pipe"),
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),  # surfaces are drawn without a graphics card
+)
 #: the browser reads its descriptor 3 and writes to its descriptor 4
 _LAUNCH = """
 import fcntl, os, sys
@@ -99,11 +90,11 @@ class Page:
         elif method == "Network.requestWillBeSent":
             self.requests.append(said["request"]["url"])
 
-    def open(self, url: str, *, width: int = 1280, height: int = 900) -> None:
-        """Open an address in a window of a size, and wait until the explorer is there."""
+    def open(self, url: str, *, width: int = 1280, height: int = 900, ready: str = "window.explorer && window.explorer.ready") -> None:
+        """Open an address in a window of a size, and wait until the page is ready."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
         self.call("Page.navigate", url=url)
-        self.wait("window.explorer && window.explorer.ready")
+        self.wait(f"document.readyState === 'complete' && ({ready})")
 
     def ask(self, expression: str) -> Any:
         """The value of an expression of JavaScript on the page."""

@@ -404,5 +404,5 @@ class Branch(Sequence[Equilibrium]):
         return cite(self)
 
     def _repr_html_(self) -> str:
-        """The table and the pressure-volume diagram, for notebooks."""
+        """The branch to explore, for notebooks; a still picture with a table where scripts are not allowed or Plotly is not installed."""
         return door.branch_html(self)

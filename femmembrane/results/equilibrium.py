@@ -356,7 +356,7 @@ class Equilibrium:
         return self.remembered(("errors", held), estimate)
 
     def _repr_html_(self) -> str:
-        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        """The membrane in space with its verdicts, for notebooks; a still picture with numbers where scripts are not allowed."""
         return door.equilibrium_html(self)
 
 

@@ -284,6 +284,7 @@ function choices() {
   fill(byId("across"), quantities, keep("across", data.axes[0]));
   fill(byId("up"), quantities, keep("up", data.axes[1]));
   fill(byId("color"), [...data.fields.map((f) => [f.name, f.label]), [ZONED, "zones"]], byId("color").value || "stretch_2");
+  document.body.classList.toggle("single", data.states.length === 1);
   byId("slider").max = data.states.length - 1;
   byId("status").replaceChildren(make("b", data.status, data.good ? "good" : "bad"), ...[data.message, ...data.notes].filter(Boolean).map((n) => make("span", ` ${n}`)));
 }

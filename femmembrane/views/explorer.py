@@ -69,6 +69,14 @@ def as_json(data: Any) -> str:
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
+def framed(branch: Branch, still: str) -> str:
+    """The page in a frame of a notebook, behind a still picture that it replaces where scripts run; without Plotly the picture alone."""
+    if find_spec("plotly") is None:
+        return still
+    look = "width:100%;height:0;border:0"
+    return f'<div>{still}</div><iframe data-femmembrane="explorer" style="{look}" srcdoc="{escape(explorer(branch))}"></iframe>'
+
+
 def check_explorer() -> Path:
     """The script of the library that draws the page. Raise InputError where it is not installed: before anything is computed."""
     found = find_spec("plotly")

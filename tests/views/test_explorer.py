@@ -286,3 +286,31 @@ def test_readable_on_a_phone(branch: fm.Branch, tmp_path: Path) -> None:
         assert page.ask("document.documentElement.scrollWidth") <= 390
         assert page.ask("parseFloat(getComputedStyle(byId('numbers')).fontSize)") >= 13
         assert page.errors == []
+
+
+# --- in a notebook
+
+
+def test_frame_of_a_notebook(branch: fm.Branch, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The frame comes after a still picture, which is all that there is without Plotly."""
+    for shown in (branch, branch[-1]):
+        html = shown._repr_html_()
+        still, _, frame = html.partition("<iframe")
+        assert "<img" in still
+        assert "<table>" in still
+        assert 'srcdoc="&lt;!DOCTYPE' in frame
+    monkeypatch.setattr(pages, "find_spec", lambda name: None)
+    assert "<iframe" not in branch._repr_html_()
+    assert "<table>" in branch._repr_html_()
+
+
+@needs_browser
+def test_frame_takes_the_place_of_the_still_picture(branch: fm.Branch, tmp_path: Path) -> None:
+    page = tmp_path / "notebook.html"
+    page.write_text(f"<!DOCTYPE html><meta charset='utf-8'><link rel='icon' href='data:,'>{branch[-1]._repr_html_()}", encoding="utf-8")
+    with browser() as shown:
+        shown.open(page.as_uri(), ready="document.querySelector('div').hidden")
+        assert shown.ask("document.querySelector('iframe').clientHeight") > 400
+        number = shown.ask("document.querySelector('iframe').contentDocument.getElementById('numbers').textContent")
+        assert f"{branch[-1].pressure:.9g}" in number
+        assert shown.errors == []

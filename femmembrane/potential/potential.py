@@ -557,11 +557,7 @@ def potential_of(scene: Scene) -> Potential:
         While the mesh of the scene is still to be chosen.
     """
     require_elements(scene)
-    electric = scene.electricity
-    if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
-        electric = scene.electric.plain(scene.scales)
-    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain))
+    return _potential_of(scene.bare)
 
 
 def require_elements(scene: Scene) -> None:

@@ -27,6 +27,7 @@ from ..physics.magnetics import Source
 from ..physics.materials import Material
 from ..physics.named import material_data
 from ..physics.scales import AGREEMENT, Scales
+from ..threads import cached_property
 from .analysis import Analysis
 from .magnetisation import checked_magnetisation, refuse_magnetisation
 from .run import GAS, Run
@@ -300,6 +301,14 @@ class Scene:
         return dataclasses.replace(
             plain, start=None if plain.start == ends[0] else plain.start, stop=None if plain.stop == ends[1] else plain.stop
         )
+
+    @cached_property
+    def bare(self) -> Self:
+        """The scene without what its potential does not depend on: one for all scenes that differ only in what is done with them."""
+        electric = self.electricity
+        if electric is None and self.electric is not None and self.electric.ends:  # elements end there
+            electric = self.electric.plain(self.scales)
+        return self.replace(title="", run=None, analysis=Analysis(), radius_to_thickness=1.0, scales=None, electric=electric)
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.

@@ -334,6 +334,8 @@ def _draw_azimuthal(axes: Axes, branch: Branch, shown: _Shown) -> None:
 
 def _azimuthal(branch: Branch, shown: _Shown) -> Iterator[tuple[tuple[int, ...], Array]]:
     """The stretches of the line by the azimuthal modes to which they are unstable."""
+    if not branch.scene.analysis.azimuthal_modes:
+        return iter(())
     words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
     return _lines(_segments(shown, words), lambda piece: tuple(n for n, word in piece.words.items() if word == "unstable"))
 

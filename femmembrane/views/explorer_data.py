@@ -114,7 +114,7 @@ def page_data(branch: Branch, units: str = "scaled", *, shapes: bool = True) -> 
         "length": chosen.unit("rho"),
         "states": [_state(state, place, names, chosen) for state, place in zip(states, places, strict=True)],
         "shapes": [shape_of(state.equilibrium, chosen) for state in states] if shapes else None,
-        **_room([state.equilibrium for state in states], chosen),
+        **_room([state.equilibrium for state in states] if shapes else _some(states), chosen),
     }
 
 
@@ -253,6 +253,11 @@ def _mode(label: str, waves: int, shape: Mapping[str, Array], nodes: Array, s: A
     parts = {key: np.interp(s, nodes[order], np.asarray(shape[key])[order]) for key in ("u", "w", "c") if key in shape}
     largest = max(float(np.abs(part).max()) for part in parts.values()) or 1.0
     return {"label": label, "n": waves, **{key: _array(part / largest, 4) for key, part in parts.items()}}
+
+
+def _some(states: Sequence[State], most: int = 7) -> list[Equilibrium]:
+    """A few equilibria, ends included: what a page has room for that is drawn many times a second."""
+    return [states[int(k)].equilibrium for k in np.unique(np.linspace(0, len(states) - 1, most).round().astype(int))]
 
 
 def _room(shown: Sequence[Equilibrium], units: Units) -> dict[str, Any]:

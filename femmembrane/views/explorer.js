@@ -288,16 +288,6 @@ function choices() {
   byId("slider").max = data.states.length - 1;
   byId("status").replaceChildren(make("b", data.status, data.good ? "good" : "bad"), ...[data.message, ...data.notes].filter(Boolean).map((n) => make("span", ` ${n}`)));
 }
-// another branch in place of the one shown, at the state as far along it
-async function replace(fresh) {
-  const share = now / Math.max(data.states.length - 1, 1);
-  data = fresh;
-  now = shown = Math.round(share * (data.states.length - 1));
-  choices();
-  diagram();
-  points();
-  await show(now);
-}
 async function start() {
   await unpacked();
   choices();

@@ -64,6 +64,13 @@ def page_of(data: Mapping[str, Any], *, live: str = "", script: str = "") -> str
     return _MARK.sub(lambda mark: parts[mark[1]], _text("explorer.html"))
 
 
+def live_page(data: Mapping[str, Any]) -> str:
+    """The page whose branch is computed anew while its sliders are moved; ``data["live"]`` has the sliders, a server the answers."""
+    return page_of(
+        data, live='<section class="live" id="live" aria-label="numbers of the scene"></section>', script=_text("explorer_live.js")
+    )
+
+
 def as_json(data: Any) -> str:
     """JSON that may stand inside an element of a page, whatever texts are in it."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

@@ -33,7 +33,7 @@ from .figures import AMONG, Style
 from .picture import zone_colors
 from .surroundings import Box, surroundings
 from .svg import dark
-from .vtk import Array, finite_at_ends
+from .vtk import Array, finite_at_ends, spread
 from .zones import PATTERNS
 
 if TYPE_CHECKING:
@@ -215,8 +215,8 @@ def shape_of(equilibrium: Equilibrium, units: Units) -> dict[str, Any]:
     """
     space, zones = equilibrium.potential.space, equilibrium.zones()
     nodes = space.node_parameters()
-    spread = np.interp(np.linspace(0, nodes.size - 1, PLACES_ALONG), np.arange(nodes.size), nodes)
-    s = np.unique(np.concatenate([spread, [zone.s[1] for zone in zones]]).clip(spread[0], spread[-1]))
+    places = spread(equilibrium, PLACES_ALONG)
+    s = np.unique(np.concatenate([places, [zone.s[1] for zone in zones]]).clip(places[0], places[-1]))
     profile = finite_at_ends(equilibrium.profile(s))
     length = units.factor("rho")
     fields = [name for name in PROFILE if name in profile and name not in ("rho", "eta", "r", "s")]

@@ -62,7 +62,7 @@ class Session:
         from ..quantities import Units
         from ..verbs.live import ELEMENTS, LiveScene
 
-        self.units, self._chosen = units, Units.of(units, scene.scales)
+        self.units, self._chosen = units, Units.of(units, scene.converter)
         self.live = LiveScene(scene)
         own = self.live.elements
         self._choices = [] if own is None else sorted({*ELEMENTS, own})

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..quantities import words
+from ..quantities import PLACES, words
 from ..solve.controls import CONTROLS, control_kind
 from . import door
 
@@ -83,6 +83,41 @@ class ErrorEstimate:
             d: Deviation = getattr(self, name)
             lines.append(f"{words(name):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
         return "\n".join(lines + ([self.reason] if self.reason else []))
+
+
+@dataclass(frozen=True)
+class PlaceEstimate:
+    """Estimated discretisation errors of the place of a special point.
+
+    Attributes
+    ----------
+    pressure, volume, center_height : Deviation
+    method : str
+        What was compared.
+    reason : str
+        Why errors are NaN; empty when there is an estimate.
+    """
+
+    pressure: Deviation
+    volume: Deviation
+    center_height: Deviation
+    method: str
+    reason: str = ""
+
+    def __str__(self) -> str:
+        lines = [self.method, f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
+        for name in PLACES:
+            d: Deviation = getattr(self, name)
+            lines.append(f"{words(name):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
+        return "\n".join(lines + ([self.reason] if self.reason else []))
+
+
+def place_from_numbers(values: Mapping[str, float], better: Mapping[str, float] | None, method: str, reason: str) -> PlaceEstimate:
+    """The record of values and of those of a finer space, by name; None: without an estimate."""
+    errors = dict.fromkeys(values, np.nan) if better is None else {name: value - better[name] for name, value in values.items()}
+    return PlaceEstimate(
+        **{name: Deviation(values[name], errors[name], abs(values[name])) for name in PLACES}, method=method, reason=reason
+    )
 
 
 #: the quantities of an estimate, in its order

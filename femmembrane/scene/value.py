@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -27,12 +27,14 @@ from ..physics.magnetics import Source
 from ..physics.materials import Material
 from ..physics.named import material_data
 from ..physics.scales import AGREEMENT, Scales
-from ..threads import cached_property
 from .analysis import Analysis
 from .magnetisation import checked_magnetisation, refuse_magnetisation
 from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 from .variation import names
+
+if TYPE_CHECKING:
+    from ..quantities import Converter
 
 MAX_DEGREE = 8
 #: largest pre-stretch: its sixth power is still a number beside 1
@@ -228,8 +230,11 @@ class Scene:
             self.electric.plain(self.scales)  # refuses units without scales
             ends = self.mesh.breakpoints()
             self.electric.check(float(ends[0]), float(ends[-1]))
-            if hasattr(self.material, "volume_ratio"):
-                allowed = "an incompressible material is allowed with a voltage or a charge, whose field follows from a constant volume"
+            if hasattr(self.material, "volume_ratio") and not hasattr(self.material, "electrified"):
+                allowed = (
+                    "a compressible material is allowed with a voltage or a charge if it says how the field changes its thickness, in a "
+                    "method `electrified` as that of Hooke; an incompressible one needs none"
+                )
                 raise InputError("material.kind", type(self.material).__name__, allowed)
 
     def _check_sources(self, lift: Lift | None) -> None:
@@ -288,6 +293,14 @@ class Scene:
         return tuple(sorted(places))
 
     @property
+    def converter(self) -> Converter | None:
+        """What turns its numbers into SI units: its scales, with the permittivity of its electrodes; None without scales."""
+        if self.electric is None:
+            return self.scales
+        found: Converter | None = self.electric.converter(self.scales)
+        return found
+
+    @property
     def electricity(self) -> Electric | None:
         """Voltage or charge without units; None where there is none, or its number is 0."""
         if self.electric is None:
@@ -301,14 +314,6 @@ class Scene:
         return dataclasses.replace(
             plain, start=None if plain.start == ends[0] else plain.start, stop=None if plain.stop == ends[1] else plain.stop
         )
-
-    @cached_property
-    def bare(self) -> Self:
-        """The scene without what its potential does not depend on: one for all scenes that differ only in what is done with them."""
-        electric = self.electricity
-        if electric is None and self.electric is not None and self.electric.ends:  # elements end there
-            electric = self.electric.plain(self.scales)
-        return self.replace(title="", run=None, analysis=Analysis(), radius_to_thickness=1.0, scales=None, electric=electric)
 
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.

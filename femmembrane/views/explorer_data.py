@@ -91,7 +91,7 @@ def page_data(branch: Branch, units: str = "scaled", *, shapes: bool = True) -> 
         For SI units of a scene without scales.
     """
     load()
-    chosen = Units.of(units, branch.scene.scales)
+    chosen = Units.of(units, branch.scene.converter)
     names = drawn_columns(branch)
     strands, states = Strands.of(branch, names, chosen), states_of(branch)
     places = [strands.points[s.place] if s.step is None else strands.steps[s.step] for s in states]

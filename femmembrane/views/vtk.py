@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
 
-#: profile quantities that a file shows as point data, in this order; quantities in Pa only when the scene has scales
-FIELDS = (*PROFILE, *(in_si(name) for name in PROFILE if quantity(name).si))
+#: profile quantities that a file shows as point data, in this order; those in SI units only when the scene has scales,
+#: and the electric field only when it has electrodes
+FIELDS = (*PROFILE, *(in_si(name) for name in PROFILE if quantity(name).si), "electric_field", in_si("electric_field"))
 SECTORS = 48
 
 
@@ -172,8 +173,9 @@ def smooth_profile(equilibrium: Equilibrium, points: int = 0, most: int | None =
     With fewer nodes than ``points`` it is taken at that many places instead, so that the curvature of long elements shows; with more than
     ``most``, at ``most`` places that are spread like the nodes.
     """
-    count = equilibrium.potential.space.node_parameters().size
-    found = equilibrium.profile(None if most is None or count <= most else spread(equilibrium, most))
+    found = equilibrium.profile()
+    if most is not None and found["r"].size > most:
+        found = equilibrium.profile(spread(equilibrium, most))
     if found["r"].size < points:
         s = equilibrium.potential.space.node_parameters()
         found = equilibrium.profile(np.linspace(s[0], s[-1], points))

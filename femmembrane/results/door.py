@@ -233,6 +233,13 @@ def write_report(branch: Branch, path: str | PathLike[str], units: str = "scaled
     write_report(branch, path, units=units)
 
 
+def write_explorer(branch: Branch, path: str | PathLike[str], units: str = "scaled") -> None:
+    """See :func:`femmembrane.views.explorer.write_explorer`."""
+    from ..views.explorer import write_explorer
+
+    write_explorer(branch, path, units=units)
+
+
 def branch_html(branch: Branch) -> str:
     """See :func:`femmembrane.views.notebook.branch_html`."""
     from ..views.notebook import branch_html

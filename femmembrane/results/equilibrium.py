@@ -436,7 +436,7 @@ class Equilibrium:
         return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
-        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        """The membrane in space with its verdicts, for notebooks; a still picture with numbers where scripts are not allowed."""
         return door.equilibrium_html(self)
 
 

@@ -1,0 +1,80 @@
+"""Homogeneous tests: nominal stress of an incompressible material in uniaxial, planar and equibiaxial tension.
+
+With the strain energy W(e1, e2) of logarithmic strains and s_i = dW/de_i, the nominal stress along 1 is s_1/lambda (Treloar 1944)::
+
+    uniaxial      e2 = -e/2        planar      e2 = 0        equibiaxial      e2 = e
+
+Derivatives by numbers are central differences of these closed forms.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .bulge import _STEP, _weights
+from .laws import Law
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+Array = NDArray[np.float64]
+
+KINDS = {"uniaxial": -0.5, "planar": 0.0, "equibiaxial": 1.0}
+
+
+class Simple:
+    """Predictions of a homogeneous test.
+
+    Parameters
+    ----------
+    law : Law
+    kind : {"uniaxial", "planar", "equibiaxial"}
+    """
+
+    def __init__(self, law: Law, kind: str) -> None:
+        self.law, self.kind, self.why = law, kind, ""
+        if hasattr(law.scene.material, "volume_ratio") and kind != "equibiaxial":
+            raise InputError("data", kind, f"an incompressible material is allowed, not {type(law.scene.material).__name__}")
+
+    def stress(self, values: Array, stretch: Array) -> Array:
+        """Nominal stress in units of the shear modulus of the scene at the start."""
+        factor, scene = self.law.split(values)
+        if scene.modulus is not None:  # of a scene whose other numbers are in units of stress too
+            factor = float(scene.modulus.given)
+        e = np.log(stretch)
+        found: Array = factor * np.asarray(scene.material.stress(e, KINDS[self.kind] * e)[0], dtype=float) / stretch
+        return found
+
+    def predict(self, values: Array, stretch: Array) -> tuple[Array, Array] | None:
+        """Stress, and its derivatives by the numbers and the stretch, shape (m, p + 1)."""
+        try:
+            with np.errstate(all="ignore"):
+                own = self.stress(values, stretch)
+                columns = []
+                for k, value in enumerate(values):
+                    step, sides = _STEP * (abs(value) if value else 1.0), []
+                    for distance in (step, -step, 2 * step, -2 * step):
+                        beside = values.copy()
+                        beside[k] = value + distance
+                        try:
+                            sides.append((distance, self.stress(beside, stretch)))
+                        except InputError:
+                            continue
+                        if len(sides) == 2:
+                            break
+                    weights = _weights(sides[0][0], sides[1][0])
+                    columns.append(sum(w * (side - own) for w, (_, side) in zip(weights, sides, strict=True)))
+                step = _STEP * stretch
+                columns.append((self.stress(values, stretch + step) - self.stress(values, stretch - step)) / (2 * step))
+        except (InputError, ArithmeticError, IndexError) as error:
+            self.why = str(error)
+            return None
+        derivatives = np.stack(columns, axis=1)
+        if not (np.isfinite(own).all() and np.isfinite(derivatives).all()):
+            self.why = "the material is stretched beyond what it can bear"
+            return None
+        return own, derivatives

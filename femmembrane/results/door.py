@@ -5,7 +5,7 @@ Records stand below these rooms. They go up here alone, when one of their method
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
     from ..solve.controls import Gas
+    from ..solve.sensitivity import Rates, Sensitive
     from ..stability.profile import Profile
     from .branch import Branch
     from .convergence import Convergence
@@ -88,6 +89,21 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     from ..accuracy.error_estimate import estimate_errors
 
     return estimate_errors(potential, x, pressure, control, verdicts)
+
+
+def eigenvalue_rates(
+    eq: Equilibrium,
+    known: Sensitive,
+    rates: Rates,
+    control: str | None,
+    azimuthal: int,
+    moved: Callable[[int, float], tuple[Scene, Array, float]],
+    step: Callable[[int], float],
+) -> Array:
+    """See :func:`femmembrane.stability.eigenvalue_rates.eigenvalue_rates`."""
+    from ..stability.eigenvalue_rates import eigenvalue_rates
+
+    return eigenvalue_rates(eq, known, rates, control, azimuthal, moved, step)
 
 
 # --- pictures and pages

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -221,9 +221,18 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
+        return door.profile_at(self.scene, self.state, self.pressure, self.places(r)).columns(self.scene.scales)
+
+    def places(self, r: ArrayLike | None = None) -> Array:
+        """Parameters of the meridian at reference radii, see :meth:`profile`.
+
+        Parameters
+        ----------
+        r : array_like, optional
+            Default: the nodes.
+        """
         space = self.potential.space
-        s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
-        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
@@ -354,6 +363,66 @@ class Equilibrium:
             return door.estimate_errors(self.potential, self.state, self.pressure, held, verdicts)
 
         return self.remembered(("errors", held), estimate)
+
+    @one_thread
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = "pressure",
+        to: str | Sequence[str] = (),
+        *,
+        held: str | None = None,
+        r: ArrayLike | None = None,
+        control: str | None = None,
+        azimuthal: int = 0,
+    ) -> Any:
+        """Derivatives of what the equilibrium answers with respect to numbers of its scene, while a quantity is held.
+
+        They are exact on the mesh, beyond limit points as well: one back-substitution a number with the factors of the equilibrium.
+        Profiles, electric quantities and eigenvalues against waves around the axis are good to about nine digits.
+
+        Parameters
+        ----------
+        of : str or list of str
+            ``pressure``, ``volume``, ``center_height``, ``gas_amount``; ``energy``, ``elastic_energy``, ``magnetic_energy``,
+            ``load_energy``, ``electric_energy``; ``voltage``, ``charge``, ``capacitance``, ``electric_field``; ``eigenvalue``, the smallest
+            one; columns of :meth:`profile`: ``rho``, ``eta``, ``stretch_1``, ``total_stress_2``, ... Of a scene with scales those with
+            ``_pa``, ``_m``, ... as well, while the scales stay.
+        to : str or list of str
+            Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
+            Numbers that go with one, as other moduli of Ogden's material do, go with it here too.
+        held : {"pressure", "volume", "center_height", "gas"}, optional
+            Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
+        r : array_like, optional
+            Where profiles are wanted, as for :meth:`profile`. Default: the nodes.
+        control, azimuthal : as for :meth:`verdict`
+            Which eigenvalue.
+
+        Returns
+        -------
+        float, ndarray or dict
+            For one quantity and one number its derivative, an array for a profile. A list of numbers gives a dict by their names, a list of
+            quantities one by theirs with such values in it.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
+        SolveError
+            At a fold of what is held, where nothing has a derivative.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> eq = fm.equilibrium(fm.Scene(material=fm.MooneyRivlin(0.1), mesh=fm.disc(16)), center_height=1.0)
+        >>> print(f"{eq.sensitivity('pressure', 'material.ratio', held='center_height'):.4f}")
+        2.1351
+        >>> both = eq.sensitivity(["pressure", "volume"], ["material.ratio", "membrane.prestretch"], held="center_height")
+        >>> print(f"{both['volume']['membrane.prestretch']:.4f}")
+        2.9464
+        """
+        from .sensitivities import Along, sensitivity_of
+
+        return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
         """Numbers and verdicts with the deformed meridian, for notebooks."""

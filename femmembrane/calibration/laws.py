@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
+from ..physics.along import Along
 from ..physics.materials import MooneyRivlin, Ogden
 from ..scene.moduli import without_moduli
 from ..scene.toml import MATERIALS, material_of
@@ -55,6 +56,8 @@ _MODULI: Mapping[str, Callable[[Any, float], dict[str, float]]] = {
     "veronda-westmann": lambda m, mu: {"c1": mu / m.b, "b": m.b},
     "hooke": lambda m, mu: {"young_modulus": 2 * mu * (1 + m.poisson_ratio), "poisson_ratio": m.poisson_ratio},
 }
+#: sizes of exponents of Ogden's material, and the factor by which other numbers of one sign may differ from those at the start
+_EXPONENTS, _FACTOR = (0.02, 60.0), 1e6
 #: numbers without a unit among them
 _RATIOS = frozenset({"jm", "alpha1", "alpha2", "beta", "delta", "b", "poisson_ratio", "share", "ratio", "links"})
 #: numbers that may be 0 or have any sign; all others keep the sign that they have at the start
@@ -87,6 +90,15 @@ class Coordinate:
     sign: float = 1.0
     low: float = -math.inf
     high: float = math.inf
+
+    @classmethod
+    def of_one_sign(cls, value: float, rest: str) -> Coordinate:
+        """Of a number that keeps its sign. Its size has bounds that no measured material comes near, so that what data do not say ends there."""
+        if rest.startswith("alpha."):
+            low, high = _EXPONENTS
+        else:
+            low, high = abs(value) / _FACTOR, abs(value) * _FACTOR
+        return cls(True, math.copysign(1.0, value), math.log(min(low, abs(value))), math.log(max(high, abs(value))))
 
 
 class Law:
@@ -143,9 +155,7 @@ class Law:
                 others = ", ".join(f"material.{n}" for n in self.absolute)
                 raise InputError("parameters", name, f"beside a modulus these numbers of the material are allowed: {others}")
         self._refuse_one_modulus()
-        if self.free_modulus and scene.modulus is not None and not _is_even(scene) and (scene.scales is None or _in_units_of_stress(scene)):
-            allowed = "a scene with scales and without sources, loads, voltage and chamber is allowed, as its modulus varies along the meridian"
-            raise InputError("membrane.modulus", scene.modulus, allowed)
+        self._refuse_modulus(scene)
         self.start = np.array([self._value(name) for name in self.names])
         self.coordinates = [self._coordinate(name, value) for name, value in zip(self.names, self.start, strict=True)]
 
@@ -156,6 +166,22 @@ class Law:
             raise InputError("parameters", list(self.names), f"{' and '.join(OVERALL)} are the same number; leave one out")
         if any(n.startswith("material.mu.") for n in self.names) and len(getattr(self.scene.material, "mu", ())) == 1:
             raise InputError("parameters", list(self.names), f"the only modulus and {self.overall} are the same number; leave one out")
+
+    def _refuse_modulus(self, scene: Scene) -> None:
+        """A free shear modulus needs a place in the scene, and numbers of what else is in units of it."""
+        if not self.free_modulus:
+            return
+        if scene.scales is None and scene.modulus is not None and not _is_even(scene):
+            raise InputError("membrane.modulus", scene.modulus, "a scene with scales is allowed where the modulus varies along the meridian")
+        known = names(scene)
+        lacking = [name for name in self.beside_modulus(scene) if name not in known]
+        if isinstance(scene.remanence, Along):
+            lacking.append("membrane.remanence")
+        if len([n for n in known if n.startswith("load.")]) < len(scene.loads):
+            lacking.append("load")
+        if lacking:
+            allowed = f"a known shear modulus is allowed here: {lacking[0]} is in units of it, and is no number that could follow it"
+            raise InputError("parameters", list(self.names), allowed)
 
     def _beside_mu(self) -> dict[str, float]:
         """Numbers of a model that stand beside its shear modulus."""
@@ -196,7 +222,7 @@ class Law:
             return Coordinate(False, low=0.0, high=1.0 if rest == "share" else math.inf)
         if value == 0:
             return Coordinate(False)
-        return Coordinate(True, sign=math.copysign(1.0, value))
+        return Coordinate.of_one_sign(value, rest)
 
     # --- coordinates of the solver
 
@@ -262,12 +288,32 @@ class Law:
     def split(self, values: Array, scene: Scene | None = None) -> tuple[float, Scene]:
         """Factor of the unit of stress, and the scene with the material over it, for the scene of one of the tests.
 
+        Other numbers of the scene that are in units of stress are divided by the factor: magnets, weights and voltages stay what they are.
+
         Raises
         ------
         InputError
             For numbers that no scene can have.
         """
-        scene = scene or self.scene
+        factor, made = self._made(values, scene or self.scene)
+        if factor != 1.0:
+            for name, power in self.beside_modulus(made).items():
+                number = Parameter(made, name)
+                made = number.scene_at(number.value * factor**power)
+        return factor, made
+
+    def beside_modulus(self, scene: Scene) -> dict[str, float]:
+        """Numbers of a scene in units of stress, and by which power of a free shear modulus they change."""
+        if not self.free_modulus or not _in_units_of_stress(scene):
+            return {}
+        known = names(scene)
+        powers = {f"source.{k}.strength": -1.0 for k in range(len(scene.sources))}
+        powers |= {n: -1.0 for n in known if n.startswith("load.")}
+        powers |= {n: -0.5 for n in known if n.startswith("electric.") or n in ("membrane.saturation", "membrane.remanence")}
+        return powers
+
+    def _made(self, values: Array, scene: Scene) -> tuple[float, Scene]:
+        """The factor, and the scene with its other numbers as they are."""
         factor = _even_modulus(scene)
         if _is_even(scene):
             scene = scene.replace(modulus=None)
@@ -279,12 +325,13 @@ class Law:
             material, modulus = self._material(numbers)
             factor = modulus / self.unit
             scene = scene.replace(material=material)
-        elif scene is not self.scene:
+        elif scene.material != self.scene.material:
             scene = scene.replace(material=self.scene.material)
+        known = names(scene) if given else ()
         for name, value in given.items():
-            if name in names(scene):
+            if name in known:
                 scene = Parameter(scene, name).scene_at(value)
-        return (1.0, scene.replace(modulus=factor)) if factor != 1.0 and _in_units_of_stress(scene) else (factor, scene)
+        return factor, scene
 
     def _material(self, numbers: dict[str, float]) -> tuple[Any, float]:
         """The material over its shear modulus, and this."""
@@ -302,17 +349,18 @@ class Law:
 
     def fitted_scene(self, values: Array) -> Scene:
         """The scene with these numbers: a free modulus goes into its scales, or without scales into the modulus of its sheet."""
-        factor, scene = self.split(values)
+        factor, scene = self._made(values, self.scene)
         if factor == 1.0:
             return scene
         if not self.free_modulus or scene.scales is None:
             return scene.replace(modulus=factor)
-        return scene.replace(scales=dataclasses.replace(scene.scales, shear_modulus=factor * self.unit))
+        scene = self.split(values)[1]
+        scales: Any = scene.scales
+        return scene.replace(scales=dataclasses.replace(scales, shear_modulus=factor * self.unit))
 
     def shear_modulus(self, values: Array) -> float:
         """The shear modulus at rest, in the unit of the moduli."""
-        factor, scene = self.split(values)
-        return factor * self.unit * _even_modulus(scene)
+        return self._made(values, self.scene)[0] * self.unit
 
 
 #: how far inside the edge of stability a solver may come
@@ -321,7 +369,7 @@ _EDGE = 1.0 + 1e-9
 
 def _in_units_of_stress(scene: Scene) -> bool:
     """Whether numbers of a scene besides its material are in units of the shear modulus."""
-    return bool(scene.sources or scene.loads or scene.electric is not None or scene.chamber is not None)
+    return bool(scene.sources or scene.loads or scene.electric is not None)
 
 
 def _is_even(scene: Scene) -> bool:

@@ -155,8 +155,8 @@ class Problem:
 
     # --- the solver
 
-    def minimise(self, start: Array, fixed: Sequence[int] = (), max_evaluations: int = 60) -> Estimate:
-        """The least squares from one start, with some numbers fixed.
+    def minimise(self, start: Array, fixed: Sequence[int] = (), max_evaluations: int = 60, tolerance: float = 1e-9) -> Estimate:
+        """The least squares from one start, with some numbers fixed; the tolerance is that of the sum of squares.
 
         Raises
         ------
@@ -195,7 +195,7 @@ class Problem:
             jac=jacobian,
             bounds=(low[moving], high[moving]),
             x_scale="jac",
-            ftol=1e-10,
+            ftol=tolerance,
             xtol=1e-9,
             gtol=1e-12,
             max_nfev=max_evaluations,

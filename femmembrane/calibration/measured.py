@@ -436,7 +436,7 @@ def _kind(table: Table, asked: str | None) -> tuple[str, str]:
 
 def _places(states: States, radii: Array) -> Array:
     """Parameters of the meridian with these reference radii, from its first end on."""
-    mesh = states.potential.space.mesh
+    mesh = states.space.mesh
     ends = mesh.breakpoints()
     s = np.linspace(ends[0], ends[-1], 8 * len(ends) + 1)
     R = mesh.position(s)[0]
@@ -448,7 +448,7 @@ def _places(states: States, radii: Array) -> Array:
 
 def _distances(states: States, i: int, measured: Array) -> tuple[Array, Array]:
     """Distances of points from a meridian along its normal, and their derivatives."""
-    ends = states.potential.space.mesh.breakpoints()
+    ends = states.space.mesh.breakpoints()
     s = np.linspace(ends[0], ends[-1], 16 * (len(ends) - 1) + 1)
     curve = meridian_at(states, i, s)[0]
     nearest = np.argmin(((curve[:, None, :] - measured[:, :, None]) ** 2).sum(axis=0), axis=1)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .bulge import _STEP, _weights
+from .bulge import _STEP, neighbours
 from .laws import Law
 
 if TYPE_CHECKING:
@@ -43,8 +43,6 @@ class Simple:
     def stress(self, values: Array, stretch: Array) -> Array:
         """Nominal stress in units of the shear modulus of the scene at the start."""
         factor, scene = self.law.split(values)
-        if scene.modulus is not None:  # of a scene whose other numbers are in units of stress too
-            factor = float(scene.modulus.given)
         e = np.log(stretch)
         found: Array = factor * np.asarray(scene.material.stress(e, KINDS[self.kind] * e)[0], dtype=float) / stretch
         return found
@@ -55,22 +53,12 @@ class Simple:
             with np.errstate(all="ignore"):
                 own = self.stress(values, stretch)
                 columns = []
-                for k, value in enumerate(values):
-                    step, sides = _STEP * (abs(value) if value else 1.0), []
-                    for distance in (step, -step, 2 * step, -2 * step):
-                        beside = values.copy()
-                        beside[k] = value + distance
-                        try:
-                            sides.append((distance, self.stress(beside, stretch)))
-                        except InputError:
-                            continue
-                        if len(sides) == 2:
-                            break
-                    weights = _weights(sides[0][0], sides[1][0])
-                    columns.append(sum(w * (side - own) for w, (_, side) in zip(weights, sides, strict=True)))
+                for k in range(len(values)):
+                    sides = neighbours(values, k, lambda beside: self.stress(beside, stretch))
+                    columns.append(sum(weight * (side - own) for weight, side in sides))
                 step = _STEP * stretch
                 columns.append((self.stress(values, stretch + step) - self.stress(values, stretch - step)) / (2 * step))
-        except (InputError, ArithmeticError, IndexError) as error:
+        except (InputError, ArithmeticError) as error:
             self.why = str(error)
             return None
         derivatives = np.stack(columns, axis=1)

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.optimize import brentq
 
 from ..errors import SolveError
 from .laws import Law
@@ -27,10 +26,10 @@ Array = NDArray[np.float64]
 
 #: relative standard error up to which a number counts as determined: its 95 % interval is within half its value
 DETERMINED = 0.25
-#: relative departure of the sum of squares at the ends of a linearised interval from which on the profile is followed
-_CURVED = 0.15
-#: how far a profile is followed, in linearised standard errors
-_FARTHEST = 12.0
+#: relative departure of the profile at the ends of a linearised interval from which on it is followed, and to which its end is found
+_CURVED, _CLOSE = 0.05, 0.01
+#: how far a profile is followed, in half widths of the linearised interval, and in how many steps
+_FARTHEST, _MOST_STEPS = 6.0, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +114,11 @@ def profile_intervals(problem: Problem, estimate: Estimate, spread: Spread, half
         if k in estimate.on_bound or not np.isfinite(spread.errors[k]) or problem.law.has_edge(k):
             continue
         sides = [_Side(problem, estimate, spread, k, sign, half) for sign in (-1.0, 1.0)]
-        excess = [side.excess(half) for side in sides]
-        if all(abs(e) < _CURVED for e in excess):
+        heights = [side.height(half) for side in sides]
+        if all(abs(height - 1) < _CURVED for height in heights):
             continue
         followed.append(k)
-        low, high = (side.end(e) for side, e in zip(sides, excess, strict=True))
+        low, high = (side.end(height) for side, height in zip(sides, heights, strict=True))
         found[k] = low, high
     problem.at(estimate.point.values)
     return found, followed
@@ -138,13 +137,16 @@ class _Side:
     def value(self, distance: float) -> float:
         return float(self.estimate.point.values[self.k] + self.sign * distance * self.error)
 
-    def excess(self, distance: float) -> float:
-        """(sum of squares - minimum)/quantile^2 - 1 at a distance in standard errors; infinite beyond a bound and where nothing is found."""
+    def height(self, distance: float) -> float:
+        """Root of the sum of squares above its minimum, over the quantile: 1 at the end of the interval, distance/quantile where linear.
+
+        Infinite beyond a bound, and where nothing is found.
+        """
         value = self.value(distance)
         if not self.low < value < self.high:
             return math.inf
         law = self.problem.law
-        values, at = self.last
+        values, _ = self.last
         start = values + self.direction * (value - values[self.k])
         low, high = value_bounds(law)
         if not ((start > low) & (start < high)).all():
@@ -157,42 +159,45 @@ class _Side:
                     return math.inf
                 cost = float(point.residuals @ point.residuals)
             else:
-                found = self.problem.minimise(start, (self.k,), max_evaluations=25)
+                found = self.problem.minimise(start, (self.k,), max_evaluations=25, tolerance=1e-4)
                 cost, start = found.cost, found.point.values
         except SolveError:
             return math.inf
-        if distance > at:
-            self.last = start, distance
-        return (cost - self.estimate.cost) / self.half**2 - 1
+        self.last = start, distance
+        return math.sqrt(max(cost - self.estimate.cost, 0.0)) / self.half
 
-    def end(self, excess: float) -> float:
-        """Where the profile reaches the quantile."""
-        inside, outside = (0.0, self.half) if excess > 0 else (self.half, 1.6 * self.half)
-        self.last = self.estimate.point.values, 0.0
-        while excess <= 0:
-            excess = self.excess(outside)
-            if excess > 0:
-                break
-            if outside > _FARTHEST:
-                return self.sign * math.inf if (self.low if self.sign < 0 else self.high) in (-math.inf, math.inf) else self._bound
-            inside, outside = outside, 1.6 * outside
-        self.last = self.estimate.point.values, 0.0
+    def end(self, first: float) -> float:
+        """Where the profile reaches the quantile; ``first`` is its height at the linearised end."""
+        known, distance, height = [(0.0, 0.0)], self.half, first
+        beyond = math.inf
+        for _ in range(_MOST_STEPS):
+            if abs(height - 1) < _CLOSE:
+                return self.value(distance)
+            if height > 1:
+                beyond = min(beyond, distance)
+            if height < math.inf:
+                known = sorted([*known, (height, distance)])
+            if height < 1 and distance >= _FARTHEST * self.half:
+                return self.low if self.sign < 0 else self.high
+            distance = self._next(known, beyond)
+            height = self.height(distance)
+        return self.value(distance)
 
-        def root(distance: float) -> float:
-            self.last = self.estimate.point.values, 0.0
-            found = self.excess(distance) if distance > 0 else -1.0
-            return math.copysign(min(math.sqrt(abs(found) + 1) if found > 0 else abs(found), 10.0), found)
-
-        try:
-            at = float(brentq(root, inside, outside, xtol=5e-3 * self.half, rtol=1e-3, maxiter=20))
-        except (ValueError, RuntimeError):
-            at = outside
-        value = self.value(at)
-        return float(np.clip(value, self.low, self.high))
-
-    @property
-    def _bound(self) -> float:
-        return self.low if self.sign < 0 else self.high
+    def _next(self, known: list[tuple[float, float]], beyond: float) -> float:
+        """The next distance, by a line or a parabola through what is known."""
+        least = max(d for h, d in known if h < 1)
+        near = sorted(known, key=lambda pair: abs(pair[0] - 1))[:3]
+        if len(near) == 1:  # nothing was found beyond the bound
+            return min((least + min(beyond, 2 * self.half)) / 2, 0.98 * beyond)
+        guess = 0.0
+        for i, (h, d) in enumerate(near):
+            weight = d
+            for j, (other, _) in enumerate(near):
+                if i != j:
+                    weight *= (1 - other) / (h - other) if h != other else 1.0
+            guess += weight
+        top = min(beyond, 2.5 * least + self.half)
+        return guess if least < guess < top else (least + top) / 2
 
 
 # --- which combinations are determined
@@ -213,12 +218,14 @@ class Combination:
     error: float
 
 
-def relative_error(spread: Spread, exponents: Array, values: Array) -> float:
+def relative_error(spread: Spread, exponents: Array) -> float:
     """Relative standard error of the product of powers of the numbers."""
+    along = spread.combinations @ exponents
+    along = np.where(np.abs(along) < 1e-9 * np.abs(exponents).max(initial=1e-300), 0.0, along)
     with np.errstate(all="ignore"):
-        gradient = np.where(exponents != 0, exponents / np.where(values == 0, np.nan, values), 0.0)
-        square = float(gradient @ spread.covariance @ gradient)
-    return math.sqrt(square) if square >= 0 else math.inf
+        parts = np.where(along == 0, 0.0, along / spread.singular_values)
+    found = float(np.sqrt((parts * parts).sum()))
+    return found if math.isfinite(found) else math.inf
 
 
 def determined_combinations(law: Law, values: Array, spread: Spread) -> list[Combination]:
@@ -238,7 +245,7 @@ def determined_combinations(law: Law, values: Array, spread: Spread) -> list[Com
                 for exponent in (1.0, -1.0, 0.5, 2.0):
                     powers = np.zeros(len(values))
                     powers[k], powers[j] = 1.0, exponent
-                    best.append((relative_error(spread, powers, values), abs(exponent) != 1, _product(short, powers)))
+                    best.append((relative_error(spread, powers), abs(exponent) != 1, _product(short, powers)))
         good = sorted(c for c in best if c[0] <= DETERMINED)
         if good:
             plain = [c for c in good if c[0] < 3 * good[0][0] and not c[1]]
@@ -252,23 +259,23 @@ def determined_combinations(law: Law, values: Array, spread: Spread) -> list[Com
     if not found and count:
         powers = spread.combinations[0] / np.abs(spread.combinations[0]).max()
         powers = np.where(np.abs(powers) < 0.05, 0.0, np.round(powers, 2))
-        found.append(Combination(_product(short, powers), relative_error(spread, powers, values)))
+        found.append(Combination(_product(short, powers), relative_error(spread, powers)))
     return found
 
 
 def modulus_error(law: Law, values: Array, spread: Spread) -> float:
     """Relative standard error of the shear modulus at rest that follows from moduli."""
     own = law.shear_modulus(values)
-    gradient = np.zeros(len(values))
+    powers = np.zeros(len(values))
     for k, value in enumerate(values):
         moved = values.copy()
-        moved[k] = value * (1 + 1e-6) if value else 1e-6
+        moved[k] = value * (1 + 1e-6)
         try:
-            gradient[k] = (law.shear_modulus(moved) - own) / (moved[k] - value)
+            powers[k] = (law.shear_modulus(moved) / own - 1) / 1e-6
         except ValueError:
             return math.inf
-    square = float(gradient @ spread.covariance @ gradient)
-    return math.sqrt(square) / own if square >= 0 else math.inf
+    powers[np.abs(powers) < 1e-8] = 0.0
+    return relative_error(spread, powers)
 
 
 def short_name(name: str) -> str:

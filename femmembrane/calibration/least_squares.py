@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 _ADJUSTED = 1e-3
 _MAX_ADJUSTMENTS = 12
 #: relative change of an unknown deviation at which it is known
-_LEVEL = 1e-3
+_LEVEL = 5e-3
 #: seed of the starts beside the first
 _SEED = 20
 #: part of its standard error by which a coordinate may be inside a bound and still stand on it

@@ -212,19 +212,19 @@ def _from_file(path: Path) -> tuple[str, list[str], list[list[Any]], list[int]]:
         raise InputError("data", str(path), f"at most {_MAX_ROWS} lines are allowed")
     if not kept:
         raise InputError("data", str(path), "the file is empty; a line of headers and a line for each measurement are allowed")
-    _refuse_other_delimiters(str(path), kept)
+    _refuse_other_delimiters(path.name, kept)
     headers = [cell.strip() for cell in next(csv.reader(io.StringIO(kept[0][1])))]
     if all(math.isfinite(_parsed(cell)) for cell in headers):
-        raise InputError(str(path), kept[0][1], f"line {kept[0][0]} holds numbers; the first line must name its columns, such as pole_height_mm,pressure_kPa")
+        raise InputError(path.name, kept[0][1], f"line {kept[0][0]} holds numbers; the first line must name its columns, such as pole_height_mm,pressure_kPa")
     cells, rows = [], []
     for number, line in kept[1:]:
         row = [cell.strip() for cell in next(csv.reader(io.StringIO(line)))]
         if len(row) != len(headers):
             hint = "; a number with a decimal comma counts as two" if len(row) > len(headers) else ""
-            raise InputError(str(path), line, f"line {number} has {len(row)} values for {len(headers)} columns{hint}; decimal points are allowed")
+            raise InputError(path.name, line, f"line {number} has {len(row)} values for {len(headers)} columns{hint}; decimal points are allowed")
         cells.append(row)
         rows.append(number)
-    return str(path), headers, cells, rows
+    return path.name, headers, cells, rows
 
 
 def _refuse_other_delimiters(name: str, kept: Sequence[tuple[int, str]]) -> None:

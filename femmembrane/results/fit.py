@@ -184,7 +184,7 @@ class Fit:
         lines = [f"{'parameter':<{width}} {'value':>12} {'error':>8}  95 % interval"]
         for name in self.parameters:
             value, error, (low, high) = self.values[name], self.standard_errors[name], self.intervals[name]
-            part = f"{100 * error / abs(value):.2g} %" if value and np.isfinite(error) else "-"
+            part = f"{100 * error / abs(value):.2g} %" if error < 10 * abs(value) else "-"
             unit = f" {self.units[name]}" if self.units[name] else ""
             lines.append(f"{name:<{width}} {value:>12.6g} {part:>8}  {low:.5g} to {high:.5g}{unit}")
         lines.append(self.verdict)

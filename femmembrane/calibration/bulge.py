@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolveError, Status
 from ..discretization.space import Space, space_of_scene
+from ..errors import InputError, SolveError, Status
 from ..potential import Numbered, Potential, potential_of
 from ..scene.variation import Numbers, Parameter, names
 from ..solve.banded import BandFactor, BorderedFactor
@@ -111,8 +111,8 @@ class Bulge:
         self._last = values.copy(), states
         return states
 
-    def _numbers(self, scene: Scene) -> Array:
-        return np.array([_value(scene, name) for name in self._own])
+    def _numbers(self, scene: Scene) -> list[float]:
+        return [_value(scene, name) for name in self._own]
 
     def _warm(self, scene: Scene, values: Array, targets: Array) -> list[Any] | None:
         """From the states before, along their derivatives."""
@@ -178,12 +178,12 @@ class Bulge:
     def _mixed(self, scene: Scene, factor: float, values: Array) -> tuple[Array, Array, list[Any]]:
         """Derivatives of the numbers of the potential and of the unit of stress by those of the fit: closed forms of a few numbers."""
         mix, d_factor, moved = np.zeros((len(self._own), len(values))), np.zeros(len(values)), []
-        own = self._numbers(scene) if self._own else np.empty(0)
+        own = np.array(self._numbers(scene))
         for k in range(len(values)):
             sides = neighbours(values, k, lambda beside: self.law.split(beside, self.scene))
             d_factor[k] = sum(weight * (side[0] - factor) for weight, side in sides)
             if self._own:
-                mix[:, k] = sum(weight * (self._numbers(side[1]) - own) for weight, side in sides)
+                mix[:, k] = sum(weight * (np.array(self._numbers(side[1])) - own) for weight, side in sides)
                 mix[np.abs(mix[:, k]) * abs(values[k]) < 1e-10 * np.abs(own), k] = 0.0  # round-off of what does not change
             shifts = self.law.names[k].startswith(_MOVERS)
             moved.append(tuple((weight, space_of_scene(side[1])) for weight, side in sides) if shifts else ())

@@ -40,16 +40,16 @@ def choose(rows: Array, count: int, known: Array | None = None, most: int | None
     """
     p = rows.shape[1]
     size = float((rows * rows).sum(axis=1).max(initial=0.0)) or 1.0
-    matrix = (np.zeros((p, p)) if known is None else known.copy()) + _PRIOR * size * np.eye(p)
+    matrix: Array = (np.zeros((p, p)) if known is None else known.copy()) + _PRIOR * size * np.eye(p)
     limit = count if most is None else most
     chosen: list[int] = []
 
-    def gains(inverse: Array) -> Array:
-        found: Array = np.einsum("ip,pq,iq->i", rows, inverse, rows)
+    def gains(information: Array) -> Array:
+        found: Array = np.einsum("ip,pq,iq->i", rows, np.linalg.inv(information), rows)
         return found
 
     for _ in range(count):
-        gain = gains(np.linalg.inv(matrix))
+        gain = gains(matrix)
         for k in set(chosen):
             if chosen.count(k) >= limit:
                 gain[k] = -math.inf
@@ -60,7 +60,7 @@ def choose(rows: Array, count: int, known: Array | None = None, most: int | None
         moved = False
         for place, old in enumerate(chosen):
             without = matrix - np.outer(rows[old], rows[old])
-            gain = gains(np.linalg.inv(without))
+            gain = gains(without)
             for k in set(chosen):
                 if k != old and chosen.count(k) >= limit:
                     gain[k] = -math.inf

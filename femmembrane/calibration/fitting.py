@@ -50,9 +50,11 @@ def check_count(law: Law, problem: Problem) -> None:
     count, needed = problem.count - problem.free_states, len(law.names)
     if count < needed:
         rows = sum(len(test.table) for test in problem.tests)
-        raise InputError("data", f"{rows} rows", f"they give {count} predicted numbers for {needed} parameters; at least as many are allowed")
+        raise InputError(
+            "data", f"{rows} rows", f"they give {count} predicted numbers for {needed} parameters; at least as many are allowed"
+        )
     if count == needed and problem.has_unknown:
-        allowed = f"{needed} predicted numbers fix {needed} parameters and leave nothing to judge their noise by; give noise= (such as '1 %'), or more rows"
+        allowed = f"as many as {needed} parameters leave nothing to judge the noise by; more rows are allowed, or noise= such as '1 %'"
         raise InputError("data", f"{count} rows", allowed)
 
 
@@ -146,7 +148,9 @@ def _columns(problem: Problem, estimate: Estimate, spread: Spread, half: float) 
             unit = factors.get(block.name if block.name != "profile" else "z", 1.0)
             with np.errstate(all="ignore"):
                 J = derivatives[:, :-1]
-                band = half * np.sqrt(np.maximum(np.einsum("ip,pq,iq->i", J, np.where(np.isfinite(spread.covariance), spread.covariance, 0.0), J), 0.0))
+                band = half * np.sqrt(
+                    np.maximum(np.einsum("ip,pq,iq->i", J, np.where(np.isfinite(spread.covariance), spread.covariance, 0.0), J), 0.0)
+                )
             against = factors.get(test.target, 1.0)
             found.append(
                 FittedColumn(
@@ -180,7 +184,9 @@ def _notes(law: Law, problem: Problem, estimate: Estimate) -> list[str]:
     if not problem.has_unknown and freedom > 0:
         ratio = math.sqrt(estimate.cost / freedom)
         if stats.chi2.sf(estimate.cost, freedom) < _IMPROBABLE:
-            notes.append(f"residuals are {ratio:.3g} times the noise that was given: the model does not describe these data within it, or the noise is larger")
+            notes.append(
+                f"residuals are {ratio:.3g} times the noise given: the model does not describe these data within it, or the noise is larger"
+            )
     return notes
 
 
@@ -200,7 +206,9 @@ def _verdict(law: Law, problem: Problem, values: Array, spread: Spread, estimate
     combinations = determined_combinations(law, values, spread)
     advice = f": {_advice(law, problem, values, relative)}" if advise else ""
     if not combinations:
-        return False, f"not determined by these data{advice}"
+        count = int((spread.singular_values > 1 / DETERMINED).sum())
+        seen = f" (only {count} of {len(values)} combinations of these numbers are)" if count else ""
+        return False, f"not determined by these data{seen}{advice}"
     named = " and ".join(f"{c.name} (to {100 * c.error:.2g} %)" for c in combinations)
     verb = "is" if len(combinations) == 1 else "are"
     return False, f"only {named} {verb} determined; {', '.join(short_name(law.names[k]) for k in bad)} not determined by these data{advice}"
@@ -266,5 +274,5 @@ def _higher(law: Law, test: Measured, values: Array, information: Array) -> str:
             end = f"{reached[-1] / test.table.factors.get(test.target, 1.0):.3g}"
             header = test.table.headers.get(test.target, test.target)
             what = "heights" if test.target == "center_height" else "volumes"
-            return f"add {what} above {shown}, up to about {end} ({header})"
+            return f"add {what} above {shown}, up to about {end} ({header}), as many rows again"
     return ""

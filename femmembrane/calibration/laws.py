@@ -93,7 +93,7 @@ class Coordinate:
 
     @classmethod
     def of_one_sign(cls, value: float, rest: str) -> Coordinate:
-        """Of a number that keeps its sign. Its size has bounds that no measured material comes near, so that what data do not say ends there."""
+        """Of a number that keeps its sign. Its size has bounds far from any measured material: what data do not say ends there."""
         if rest.startswith("alpha."):
             low, high = _EXPONENTS
         else:
@@ -172,7 +172,9 @@ class Law:
         if not self.free_modulus:
             return
         if scene.scales is None and scene.modulus is not None and not _is_even(scene):
-            raise InputError("membrane.modulus", scene.modulus, "a scene with scales is allowed where the modulus varies along the meridian")
+            raise InputError(
+                "membrane.modulus", scene.modulus, "a scene with scales is allowed where the modulus varies along the meridian"
+            )
         known = names(scene)
         lacking = [name for name in self.beside_modulus(scene) if name not in known]
         if isinstance(scene.remanence, Along):
@@ -323,8 +325,7 @@ class Law:
         if self.by_moduli:
             numbers = self.absolute | {n.removeprefix("material."): given.pop(n) for n in list(given) if n.startswith("material.")}
             material, modulus = self._material(numbers)
-            factor = modulus / self.unit
-            scene = scene.replace(material=material)
+            factor, scene = modulus / self.unit, scene.replace(material=material)
         elif scene.material != self.scene.material:
             scene = scene.replace(material=self.scene.material)
         known = names(scene) if given else ()
@@ -342,10 +343,10 @@ class Law:
             return Ogden(tuple(mu / modulus), tuple(alpha)), modulus
         if self.model == "mooney-rivlin" and "c10" in numbers:
             return MooneyRivlin(numbers["c01"] / numbers["c10"]), 2 * (numbers["c10"] + numbers["c01"])
-        table, modulus = without_moduli({"model": self.model, **numbers}, None, True)
-        if modulus is None:
+        table, found = without_moduli({"model": self.model, **numbers}, None, True)
+        if found is None:
             raise InputError("material", numbers, "numbers with a shear modulus are allowed")
-        return material_of(table), modulus
+        return material_of(table), found
 
     def fitted_scene(self, values: Array) -> Scene:
         """The scene with these numbers: a free modulus goes into its scales, or without scales into the modulus of its sheet."""

@@ -203,7 +203,13 @@ class Problem:
         point = self.at(values_of(found.x))
         if point is None:
             raise SolveError(self.why, status=Status.NOT_CONVERGED)
-        return Estimate(point, (), found.status > 0, "" if found.status > 0 else f"{max_evaluations} evaluations did not suffice", self.evaluations - before)
+        return Estimate(
+            point,
+            (),
+            found.status > 0,
+            "" if found.status > 0 else f"{max_evaluations} evaluations did not suffice",
+            self.evaluations - before,
+        )
 
     def on_bounds(self, estimate: Estimate, fixed: Sequence[int] = ()) -> Estimate:
         """The estimate with numbers that lean on a bound put onto it."""
@@ -281,7 +287,9 @@ class Problem:
         x = law.to_coordinates(first)
         for _ in range(count - 1):
             move = rng.normal(0.0, 0.4, len(x))
-            other = np.array([v + m if c.logarithmic else v + m * (abs(v) or 0.0) for v, m, c in zip(x, move, law.coordinates, strict=True)])
+            other = np.array(
+                [v + m if c.logarithmic else v + m * (abs(v) or 0.0) for v, m, c in zip(x, move, law.coordinates, strict=True)]
+            )
             starts.append(law.from_coordinates(_strictly_inside(other, *law.bounds)))
         return starts
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -124,7 +125,11 @@ class Measured:
         else:
             self._simple(test)
         if not self.blocks:
-            raise InputError(self.table.name, sorted(self.table.columns), "beside what is held a column is allowed that can be predicted, such as 'pressure'")
+            raise InputError(
+                self.table.name,
+                sorted(self.table.columns),
+                "beside what is held a column is allowed that can be predicted, such as 'pressure'",
+            )
 
     @property
     def name(self) -> str:
@@ -147,7 +152,9 @@ class Measured:
         wrong = np.flatnonzero((stretch - 1) * stress < 0)
         if wrong.size:
             row = int(wrong[0])
-            raise InputError(self.table.where(row, self.stress), self.table.shown(row, self.stress), "a stress with the sign of stretch - 1 is allowed")
+            raise InputError(
+                self.table.where(row, self.stress), self.table.shown(row, self.stress), "a stress with the sign of stretch - 1 is allowed"
+            )
         kept = self._informative((stretch != 1) | (stress != 0), "stretch")
         self.target = "stretch"
         self.targets = stretch[kept]
@@ -161,7 +168,9 @@ class Measured:
         potential = potential_of(self.scene)
         has_height = potential.space.pole < potential.space.n_free
         if "center_height" in columns and not has_height:
-            raise InputError(self.table.name, "center_height", f"the first end of this {self.scene.mesh.shape} is held along the axis; give volumes")  # type: ignore[attr-defined]
+            raise InputError(
+                self.table.name, "center_height", f"the first end of this {self.scene.mesh.shape} is held along the axis; give volumes"
+            )  # type: ignore[attr-defined]
         self.target = "center_height" if has_height and ("center_height" in columns or "volume" not in columns) else "volume"
         self.predictor = Bulge(self.law, self.scene, self.target)
         scalars = [n for n in ("pressure", "center_height", "volume", "pole_stretch") if n in columns]
@@ -169,10 +178,12 @@ class Measured:
         if profile and not {"r", "z"} <= columns.keys():
             raise InputError(self.table.name, sorted(columns), "points of a profile have both 'r' and 'z'")
         if not scalars or (len(scalars) < 2 and not profile):
-            allowed = "two of pressure, center_height, volume and pole_stretch, or one of them with points r and z of the profile, are allowed"
+            allowed = (
+                "two of pressure, center_height, volume and pole_stretch, or one of them with points r and z of the profile, are allowed"
+            )
             raise InputError(self.table.name, sorted(columns), allowed)
         self._check_signs(columns)
-        numbers = columns.get("state", np.arange(len(self.table)))
+        numbers = columns.get("state", np.arange(len(self.table), dtype=float))
         values, firsts, states = np.unique(numbers, return_index=True, return_inverse=True)
         if "state" in columns:
             self._check_states(scalars, states, firsts)
@@ -189,7 +200,9 @@ class Measured:
         for name in scalars:
             if name == self.target:
                 continue
-            found = noise.get(name) or (Noise(deviation=np.full(1, _EXACT)) if name == exact and exact != self.target else Noise(unknown=True))
+            found = noise.get(name) or (
+                Noise(deviation=np.full(1, _EXACT)) if name == exact and exact != self.target else Noise(unknown=True)
+            )
             self._add(name, first, state, found)
         self._held(self.target, first, state, noise.get(self.target) if exact != self.target else None)
         if self.target not in columns:
@@ -220,7 +233,9 @@ class Measured:
         set_deviation(block, values)
         if not (block.deviation > 0).all():
             k = int(np.flatnonzero(~(block.deviation > 0))[0])
-            raise InputError(self.table.where(int(rows[k]), name), f"{name}_sd", "a standard deviation > 0 is allowed for what is predicted")
+            raise InputError(
+                self.table.where(int(rows[k]), name), f"{name}_sd", "a standard deviation > 0 is allowed for what is predicted"
+            )
 
     def _held(self, name: str, rows: Any, state: Index, noise: Noise | None) -> None:
         """What is held is known exactly, or is one more measured column."""
@@ -245,7 +260,11 @@ class Measured:
             if name == "stress" and self.stress:
                 name = self.stress
             if name not in names:
-                raise InputError("noise", name, f"columns of the table are allowed: {', '.join(n for n in names if n in (*self.table.columns, 'profile'))}")
+                raise InputError(
+                    "noise",
+                    name,
+                    f"columns of the table are allowed: {', '.join(n for n in names if n in (*self.table.columns, 'profile'))}",
+                )
             found[name] = self._one_noise(name, value)
         return found
 
@@ -263,7 +282,9 @@ class Measured:
         if is_number(value) and value >= 0:
             column = name if name != "profile" else "z"
             return Noise(deviation=np.array([float(value) * self.table.factors.get(column, 1.0)]))
-        raise InputError(key, value, "a standard deviation in the unit of the column, a text such as '1 %' or '0.05 kPa', or 'unknown' is allowed")
+        raise InputError(
+            key, value, "a standard deviation in the unit of the column, a text such as '1 %' or '0.05 kPa', or 'unknown' is allowed"
+        )
 
     def _informative(self, keep: NDArray[np.bool_], what: str) -> Index:
         kept = np.flatnonzero(keep)
@@ -289,14 +310,17 @@ class Measured:
             if name in columns and (bad := np.flatnonzero(columns[name] < 0)).size:
                 row = int(bad[0])
                 raise InputError(
-                    self.table.where(row, name), self.table.shown(row, name), "a number >= 0 is allowed: this membrane is flat at rest, and only the pressure inflates it"
+                    self.table.where(row, name),
+                    self.table.shown(row, name),
+                    "a number >= 0 is allowed: this membrane is flat at rest, and only the pressure inflates it",
                 )
         for name in ("center_height", "volume"):
             if name in columns and "pressure" in columns:
                 bad = np.flatnonzero((columns[name] == 0) & (columns["pressure"] != 0))
                 if bad.size:
                     row = int(bad[0])
-                    allowed = f"a flat membrane bears no pressure, and here the pressure is {self.table.shown(row, 'pressure'):g}; leave the row out"
+                    here = self.table.shown(row, "pressure")
+                    allowed = f"a flat membrane bears no pressure, and here the pressure is {here:g}; leave the row out"
                     raise InputError(self.table.where(row, name), self.table.shown(row, name), allowed)
 
     def _check_states(self, scalars: Sequence[str], states: Index, firsts: Index) -> None:
@@ -305,7 +329,10 @@ class Measured:
             other = np.flatnonzero(values != values[firsts[states]])
             if other.size:
                 row = int(other[0])
-                allowed = f"rows of one state have one {name}: {self.table.shown(int(firsts[states[row]]), name):g} as in row {self.table.rows[int(firsts[states[row]])]} is allowed"
+                usual = int(firsts[states[row]])
+                allowed = (
+                    f"rows of one state have one {name}: {self.table.shown(usual, name):g} as in row {self.table.rows[usual]} is allowed"
+                )
                 raise InputError(self.table.where(row, name), self.table.shown(row, name), allowed)
 
     def _note_order(self, first: Index) -> None:
@@ -350,7 +377,11 @@ class Measured:
     def _of_block(self, block: Block, states: States, p: int) -> tuple[Array, Array]:
         if block.name == self.target:
             return self._own(block, p)
-        columns = {"pressure": (states.pressure, states.d_pressure), "volume": (states.volume, states.d_volume), "center_height": (states.height, states.d_height)}
+        columns = {
+            "pressure": (states.pressure, states.d_pressure),
+            "volume": (states.volume, states.d_volume),
+            "center_height": (states.height, states.d_height),
+        }
         if block.name in columns:
             value, derivatives = columns[block.name]
             return value[block.state], derivatives[block.state]
@@ -384,8 +415,8 @@ def set_deviation(block: Block, predicted: Array) -> None:
     elif noise.deviation is not None:
         block.deviation = noise.deviation
     else:
-        size = float(np.abs(block.measured).max(initial=0.0))
-        block.deviation = np.full(len(block.measured), block.level or 0.01 * size or 0.01)
+        level = block.level or 0.01 * float(np.abs(block.measured).max(initial=0.0)) or 0.01
+        block.deviation = np.full(len(block.measured), level)
 
 
 def measured_tests(law: Law, data: Any, noise: Any, units: str | None) -> list[Measured]:
@@ -409,8 +440,6 @@ def _scene_of(law: Law, test: LabTest) -> Scene:
     if (own is None) != (other is None):
         raise InputError("scene.scales", other, "scales for the scenes of all tests, or for none, are allowed")
     if own is not None and other is not None and own.shear_modulus != other.shear_modulus:
-        import dataclasses
-
         scene = scene.replace(scales=dataclasses.replace(other, shear_modulus=own.shear_modulus), material=law.scene.material)
     return scene.replace(material=law.scene.material)
 
@@ -422,14 +451,20 @@ def _kind(table: Table, asked: str | None) -> tuple[str, str]:
         raise InputError("kind", asked, f"bulge, {', '.join(SIMPLE.values())} are allowed")
     if asked == "bulge" or (asked is None and not said and "nominal_stress" not in table.columns):
         if "stretch" in table.columns and "pressure" not in table.columns:
-            raise InputError(table.name, sorted(table.columns), "beside 'stretch' a column is allowed that says which test it is, such as 'uniaxial_stress'")
+            raise InputError(
+                table.name,
+                sorted(table.columns),
+                "beside 'stretch' a column is allowed that says which test it is, such as 'uniaxial_stress'",
+            )
         return "bulge", ""
     if said:
         if len(said) > 1 or (asked is not None and SIMPLE[said[0]] != asked):
             raise InputError(table.name, said, "one stress in a table is allowed, that of its own test; give several tables")
         return SIMPLE[said[0]], said[0]
     if asked is None:
-        allowed = "which test it is must be said: 'uniaxial_stress', 'planar_stress' or 'equibiaxial_stress' is allowed, or LabTest(..., kind=)"
+        allowed = (
+            "which test it is must be said: 'uniaxial_stress', 'planar_stress' or 'equibiaxial_stress' is allowed, or LabTest(..., kind=)"
+        )
         raise InputError(table.name, table.headers["nominal_stress"], allowed)
     return asked, "nominal_stress"
 
@@ -442,7 +477,11 @@ def _places(states: States, radii: Array) -> Array:
     R = mesh.position(s)[0]
     turn = len(R) if (np.diff(R) > 0).all() else int(np.flatnonzero(np.diff(R) <= 0)[0]) + 1
     if turn < 2 or radii.min() < R[0] - 1e-9 or radii.max() > R[turn - 1] + 1e-9:
-        raise InputError("reference_radius", float(radii.max()), f"radii from {R[0]:.6g} to {R[max(turn - 1, 0)]:.6g} of the membrane at rest are allowed")
+        raise InputError(
+            "reference_radius",
+            float(radii.max()),
+            f"radii from {R[0]:.6g} to {R[max(turn - 1, 0)]:.6g} of the membrane at rest are allowed",
+        )
     return np.interp(radii, R[:turn], s[:turn])
 
 
@@ -479,11 +518,15 @@ def check_units(tests: Sequence[Measured], predictions: Sequence[list[tuple[Arra
                 row = int(block.rows[len(block.rows) // 2])
                 factor = f"{ratio:.3g}" if ratio > 1 else f"1/{1 / ratio:.3g}"
                 near = round(math.log10(ratio) / 3) * 3
-                about = f"about {10.0**abs(near):g} times {'what' if near > 0 else 'less than'} " if near and abs(math.log10(ratio) - near) < 1 else f"{factor} times what "
+                about = (
+                    f"about {10.0 ** abs(near):g} times {'what' if near > 0 else 'less than'} "
+                    if near and abs(math.log10(ratio) - near) < 1
+                    else f"{factor} times what "
+                )
                 words = {"pressure": "pressures", "volume": "volumes"}.get(block.name, "stresses")
                 known = value[len(block.rows) // 2] / test.table.factors[block.name]
                 allowed = (
-                    f"{words} are {about}this sheet holds with the numbers of the scene ({known:.4g} there): is the unit of the column right? "
+                    f"{words} are {about}this sheet holds with the numbers of the scene ({known:.4g} there): is its unit right? "
                     "If it is, start from a shear modulus in the scene that is near"
                 )
                 raise InputError(test.table.where(row, block.name), test.table.shown(row, block.name), allowed)
@@ -507,7 +550,7 @@ def check_sizes(tests: Sequence[Measured]) -> None:
                 raise InputError(test.table.where(row, name), test.table.shown(row, name), allowed)
             top = float(np.max(np.abs(columns[name]))) / size
             if 0 < top < 1 / _FAR and test._plain and name == "center_height":
-                allowed = "the largest height is less than 1/300 of the size of this membrane, about 1000 times less than a test reaches; is the unit of the column right?"
+                allowed = "the largest is about 1000 times less than a test of this membrane reaches; is the unit of the column right?"
                 raise InputError(test.table.where(row, name), test.table.shown(row, name), allowed)
 
 

@@ -9,17 +9,12 @@ Derivatives by numbers are central differences of these closed forms.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from .bulge import _STEP, neighbours
 from .laws import Law
-
-if TYPE_CHECKING:
-    from ..scene import Scene
 
 Array = NDArray[np.float64]
 

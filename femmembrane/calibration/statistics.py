@@ -104,7 +104,9 @@ def value_bounds(law: Law) -> tuple[Array, Array]:
     return low, high
 
 
-def profile_intervals(problem: Problem, estimate: Estimate, spread: Spread, half: float, linear: Array, which: Sequence[int]) -> tuple[Array, list[int]]:
+def profile_intervals(
+    problem: Problem, estimate: Estimate, spread: Spread, half: float, linear: Array, which: Sequence[int]
+) -> tuple[Array, list[int]]:
     """Intervals by profile likelihood of those numbers whose linearised ones are not good enough, and which these are.
 
     The values at which the prediction breaks off, or beyond 12 standard errors, are infinite ends.
@@ -259,7 +261,9 @@ def determined_combinations(law: Law, values: Array, spread: Spread) -> list[Com
     if not found and count:
         powers = spread.combinations[0] / np.abs(spread.combinations[0]).max()
         powers = np.where(np.abs(powers) < 0.05, 0.0, np.round(powers, 2))
-        found.append(Combination(_product(short, powers), relative_error(spread, powers)))
+        error = relative_error(spread, powers)
+        if error <= DETERMINED:
+            found.append(Combination(_product(short, powers), error))
     return found
 
 

@@ -156,7 +156,9 @@ def read_table(data: Any, scales: Scales | None, units: str | None = None) -> Ta
     bare = [header for header, quantity, _, unit in found if quantity and KINDS[quantity] and not unit]
     united = [header for header, quantity, _, unit in found if unit]
     if bare and united:
-        raise InputError(name, bare[0], f"column {bare[0]!r} has no unit, while {united[0]!r} has one; give it after the name, as in {_example(bare[0])}")
+        raise InputError(
+            name, bare[0], f"column {bare[0]!r} has no unit, while {united[0]!r} has one; give it after the name, as in {_example(bare[0])}"
+        )
     for header, quantity, deviation, unit in found:
         if not quantity:
             continue
@@ -192,7 +194,11 @@ def _cells(data: Any) -> tuple[str, list[str], list[list[Any]], list[int]]:
     first, *others = columns
     for other in others:
         if len(columns[other]) != len(columns[first]):
-            raise InputError("data", other, f"column {other!r} has {len(columns[other])} rows and {first!r} has {len(columns[first])}; as many are allowed")
+            raise InputError(
+                "data",
+                other,
+                f"column {other!r} has {len(columns[other])} rows and {first!r} has {len(columns[first])}; as many are allowed",
+            )
     cells = [list(row) for row in zip(*columns.values(), strict=True)]
     return "data", list(columns), cells, list(range(1, len(cells) + 1))
 
@@ -215,13 +221,19 @@ def _from_file(path: Path) -> tuple[str, list[str], list[list[Any]], list[int]]:
     _refuse_other_delimiters(path.name, kept)
     headers = [cell.strip() for cell in next(csv.reader(io.StringIO(kept[0][1])))]
     if all(math.isfinite(_parsed(cell)) for cell in headers):
-        raise InputError(path.name, kept[0][1], f"line {kept[0][0]} holds numbers; the first line must name its columns, such as pole_height_mm,pressure_kPa")
+        raise InputError(
+            path.name,
+            kept[0][1],
+            f"line {kept[0][0]} holds numbers; the first line must name its columns, such as pole_height_mm,pressure_kPa",
+        )
     cells, rows = [], []
     for number, line in kept[1:]:
         row = [cell.strip() for cell in next(csv.reader(io.StringIO(line)))]
         if len(row) != len(headers):
             hint = "; a number with a decimal comma counts as two" if len(row) > len(headers) else ""
-            raise InputError(path.name, line, f"line {number} has {len(row)} values for {len(headers)} columns{hint}; decimal points are allowed")
+            raise InputError(
+                path.name, line, f"line {number} has {len(row)} values for {len(headers)} columns{hint}; decimal points are allowed"
+            )
         cells.append(row)
         rows.append(number)
     return path.name, headers, cells, rows
@@ -233,8 +245,16 @@ def _refuse_other_delimiters(name: str, kept: Sequence[tuple[int, str]]) -> None
         if mark in header:
             decimal = next((n for n, line in kept[1:] if re.search(r"\d,\d", line)), None)
             comma = f", and line {decimal} has decimal commas" if decimal else ""
-            raise InputError(name, header, f"line {number} separates its columns by {word}{comma}; commas between columns and decimal points are allowed")
-    if "," not in header and len(header.split()) > 1 and len(kept) > 1 and all(math.isfinite(_parsed(c)) for c in kept[1][1].split()) and len(kept[1][1].split()) > 1:
+            raise InputError(
+                name, header, f"line {number} separates its columns by {word}{comma}; commas between columns and decimal points are allowed"
+            )
+    if (
+        "," not in header
+        and len(header.split()) > 1
+        and len(kept) > 1
+        and all(math.isfinite(_parsed(c)) for c in kept[1][1].split())
+        and len(kept[1][1].split()) > 1
+    ):
         raise InputError(name, header, f"line {number} separates its columns by blanks; commas are allowed")
 
 
@@ -253,10 +273,14 @@ def _quantity(table: str, header: str) -> tuple[str, bool, str]:
             elif own_unit.lower().endswith(ending):
                 own_unit, deviation = own_unit[: -len(ending)], True
         base = _ALIASES.get(base, base)
-        if base in KINDS and (not own_unit or KINDS[base]):
+        if base in KINDS and (own_unit in ("", "%") or KINDS[base]):
             return base, deviation, "" if (own_unit or unit) in ("1", "-") else own_unit or unit
     lowered = word.lower()
-    if lowered in _IGNORED or lowered in QUANTITIES or not lowered or lowered.startswith(("verdict_", "lambda_")):
+    if (
+        any(name in _IGNORED or name in QUANTITIES for name, _ in _splits(lowered))
+        or not lowered
+        or lowered.startswith(("verdict_", "lambda_"))
+    ):
         return "", False, ""
     near = difflib.get_close_matches(lowered, [*KINDS, *_ALIASES], n=1, cutoff=0.6)
     hint = f"did you mean {near[0]!r}? " if near else ""
@@ -305,7 +329,9 @@ def _factor(name: str, header: str, quantity: str, unit: str, scales: Scales | N
             raise InputError(name, header, allowed)
         return scales.from_si(kind, 1.0)
     if scales is None:
-        raise InputError(name, header, f"column {header!r} has a unit, and the scene has no scales; give scales=fm.Scales(...), in a file [scales]")
+        raise InputError(
+            name, header, f"column {header!r} has a unit, and the scene has no scales; give scales=fm.Scales(...), in a file [scales]"
+        )
     try:
         size = in_unit(header, f"1 {_unit_text(unit)}", SI_UNITS[kind])[0]
     except InputError as error:
@@ -351,7 +377,11 @@ def _checked(table: Table) -> Table:
         if column in table.columns and (bad := np.flatnonzero(~(table.columns[column] > 0))).size:
             raise InputError(table.where(int(bad[0]), column), table.shown(int(bad[0]), column), "a stretch > 0 is allowed, 1 at rest")
         if column in table.columns and np.median(table.columns[column]) > 20:
-            raise InputError(table.where(0, column), table.shown(0, column), "stretches are lengths over lengths at rest, 1 at rest; are these in percent?")
+            raise InputError(
+                table.where(0, column),
+                table.shown(0, column),
+                "stretches are lengths over lengths at rest, 1 at rest; are these in percent?",
+            )
     _refuse_copies(table)
     return table
 

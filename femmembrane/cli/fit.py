@@ -87,7 +87,10 @@ def fit(
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if sys.stdout.isatty():
-        say("\n".join([str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)]) + "\n")
+        say(
+            "\n".join([str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)])
+            + "\n"
+        )
     if found.status is not Status.CONVERGED:
         return fail(NOT_CONVERGED, f"{'; '.join(found.notes)}. What suits the data best so far is in {out}")
     return DONE

@@ -329,7 +329,19 @@ class Comparison(Sequence[ComparedModel]):
                 continue
             values = " ".join(f"{name.removeprefix('material.')}={value:.6g}" for name, value in fit.values.items())
             delta = m.aicc - least
-            yield (m.name, m.numbers, fit.log_likelihood, m.aicc, m.bic, delta, weights[m.name], fit.chi_square, fit.determined, values, m.message)
+            yield (
+                m.name,
+                m.numbers,
+                fit.log_likelihood,
+                m.aicc,
+                m.bic,
+                delta,
+                weights[m.name],
+                fit.chi_square,
+                fit.determined,
+                values,
+                m.message,
+            )
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The table as a pandas DataFrame."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
+from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -69,7 +70,9 @@ def _draw(axes: Axes, column: FittedColumn, several: bool) -> None:
         fine, curve = _curve(places, column.predicted[at], column.slope[at])
         band = np.interp(fine, places, column.band[at])
         known = np.isfinite(band)
-        axes.fill_between(fine[known], (curve - band)[known], (curve + band)[known], color=_BLUE, alpha=0.25, linewidth=0, label="95 % band")
+        axes.fill_between(
+            fine[known], (curve - band)[known], (curve + band)[known], color=_BLUE, alpha=0.25, linewidth=0, label="95 % band"
+        )
         axes.plot(fine, curve, label="fitted", **line)
     look: dict[str, Any] = {"fmt": "o", "color": "#222222", "markersize": 4, "elinewidth": 1.0, "zorder": 3}
     axes.errorbar(x, column.measured, yerr=column.deviation, label="measured", **look)
@@ -86,7 +89,7 @@ def _curve(x: np.ndarray, y: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray,
 
     if len(x) < 2:
         return x, y
-    fine = np.unique(np.concatenate([np.linspace(a, b, _PARTS) for a, b in zip(x[:-1], x[1:], strict=True)]))
+    fine = np.unique(np.concatenate([np.linspace(a, b, _PARTS) for a, b in pairwise(x)]))
     return fine, CubicHermiteSpline(x, y, slope)(fine)
 
 

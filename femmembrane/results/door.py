@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .equilibria import Equilibria
     from .equilibrium import Equilibrium
     from .error_estimate import ErrorEstimate, PlaceEstimate
+    from .fit import Fit
     from .folds import FoldCurve
     from .postbuckling import Postbuckling
     from .special_point import SpecialPoint
@@ -203,6 +204,20 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Any:
     from ..views.cost import plot_cost
 
     return plot_cost(study, path)
+
+
+def plot_fit(fit: Fit, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.fit.plot_fit`."""
+    from ..views.fit import plot_fit
+
+    return plot_fit(fit, path)
+
+
+def write_fit_report(fit: Fit, path: str | PathLike[str]) -> None:
+    """See :func:`femmembrane.views.fit.write_fit_report`."""
+    from ..views.fit import write_fit_report
+
+    write_fit_report(fit, path)
 
 
 def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Any:

@@ -177,3 +177,18 @@ class Charged:
         through = float(rows[6].sum())
         cubic = space.assemble_vector(rows[:4].reshape(-1, space.n_elements)) + through * rates.state
         return cubic, float(rows[4].sum()), float(rows[5].sum()) + through * rates.number
+
+    def spread(self, x: Array, charge: Array, capacitance: Array) -> Array:
+        """Derivatives of E_Q' with respect to several numbers through the voltage Q/C alone, shape (n_free, m).
+
+        Parameters
+        ----------
+        x : ndarray, shape (n_free,)
+        charge, capacitance : ndarray, shape (m,)
+            Derivatives of Q, and of C at a fixed state and voltage.
+        """
+        square, rows = self._solved(x, 1.0)
+        space = self._potential.space
+        gradient = space.assemble_vector(rows[3:].reshape(-1, space.n_elements))
+        change = math.sqrt(square) * charge - square * capacitance
+        return -np.outer(gradient, change) / (float(rows[0].sum()) + 2 * square * float(rows[1].sum()))

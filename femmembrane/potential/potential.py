@@ -166,6 +166,12 @@ class Evaluation:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
         return self.elements.force_scale(self._densities, pressure)
 
+    def form_parts(self, mode: Array) -> tuple[float, float]:
+        """Of the integrand of mode . (E'' - P V'') mode, less what the :attr:`spring` adds: see :meth:`.Elements.form_parts`. The weights
+        are those of the highest polynomial that the quadrature points of an element tell apart.
+        """
+        return self.elements.form_parts(self._densities, np.ascontiguousarray(mode), self.potential.space.highest)
+
     @property
     def load_energy(self) -> float:
         """Energy of the loads at x: computed only when asked for, as no solver needs it."""
@@ -326,6 +332,17 @@ class Potential:
     def area(self) -> float:
         """Reference area of the membrane, of an uneven one times its thickness."""
         return float(self.bulk.sum())
+
+    @cached_property
+    def arc_band(self) -> Array:
+        """The inner product of (x, P), which is the same on every mesh: mean over the reference area of the displacements plus P Q, both in
+        units of the membrane's own size. In band storage, shape (3 kd + 1, n_free + 1).
+        """
+        square = self.space.unit**2
+        band = np.zeros((self.space.n_free + 1, len(self.mass)))
+        band[:-1] = self.mass.T / (self.area * square)
+        band[-1, 2 * self.space.half_bandwidth] = square
+        return band.T
 
     @cached_property
     def rigid(self) -> Array | None:
@@ -570,11 +587,18 @@ def potential_of(scene: Scene) -> Potential:
         While the mesh of the scene is still to be chosen.
     """
     require_elements(scene)
+    return _potential_of(_plain(scene))
+
+
+@lru_cache(maxsize=256)
+def _plain(scene: Scene) -> Scene:
+    """The scene without what makes no difference to its potential."""
     electric = scene.electricity
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
-    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain))
+    ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
+    plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
+    return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
 
 
 def require_elements(scene: Scene) -> None:

@@ -97,14 +97,14 @@ SHAPES: dict[str, Any] = {
     "curve": Curve,
 }
 #: keys of [mesh] beside the file that holds the meridian
-FILE_KEYS = ("group", "divisions", "first", "last")
+FILE_KEYS = ("group", "divisions", "first", "last", "accuracy")
 SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "membrane": (
         *("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
     "mesh": ("degree",),
-    "effects": ("tension_field", "demagnetization"),
+    "effects": ("tension_field", "demagnetization", "bending"),
 }
 #: arguments of Electric whose keys are words that Python keeps for itself, or stand beside one
 ELECTRIC_KEYS = {"start": "from", "stop": "to"}

@@ -75,6 +75,8 @@ class BranchPoint:
     tangent: Array
     dual: Array
     sigma: float
+    #: rates that were asked for, as two segments ask for those of the point between them
+    _rates: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def value(self, quantity: Followed) -> float:
         """A quantity of the curve: volume, pressure or center_height by its name, or the amount of a gas."""
@@ -82,7 +84,9 @@ class BranchPoint:
 
     def rate(self, quantity: Followed) -> float:
         """Derivative of a quantity with respect to arc length: zero at a fold in that quantity."""
-        return self.rate_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        if quantity not in self._rates:
+            self._rates[quantity] = self.rate_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        return self._rates[quantity]
 
     def rate_of(self, controlled: Controlled) -> float:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""

@@ -38,6 +38,7 @@ from .template import expressions_of
 if TYPE_CHECKING:
     from ..physics.electric import Electric
     from ..physics.materials import Material
+    from ..physics.obstacles import Obstacle
     from ..scene import Scene
 
 
@@ -139,6 +140,18 @@ class Evaluation:
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
 
+    def reduced(self, v: Array) -> Array:
+        """A vector, or columns, in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
+        return v
+
+    def expanded(self, v: Array) -> Array:
+        """The displacement of a vector in the unknowns of :attr:`band`."""
+        return v
+
+    def reduced_mass(self, mass: Array) -> Array:
+        """A mass matrix in the unknowns of :attr:`band`."""
+        return mass
+
     def inner(self, x: Array, y: Array) -> float:
         """x . (E'' - P V'') y."""
         own = kernels().inner(self.band, self.potential.space.half_bandwidth, x, y)
@@ -192,6 +205,10 @@ class Potential:
         Whether the membrane without load is flat and without stress, so that nothing but a load gives it stiffness across its plane.
     """
 
+    #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
+    obstacles: tuple[Obstacle, ...] = ()
+    unsettled = False
+
     @BUILDING
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
@@ -244,6 +261,10 @@ class Potential:
             self.symbols, self.terms = expressions_of(point_expressions, *given)
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
+
+    def placed(self, x: Array) -> Array:
+        """A state with the nodes that bodies hold moved onto them."""
+        return x
 
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
@@ -573,4 +594,8 @@ def require_elements(scene: Scene) -> None:
 
 @lru_cache(maxsize=64)
 def _potential_of(scene: Scene) -> Potential:
-    return Potential(scene)
+    if not scene.bodies:
+        return Potential(scene)
+    from .contact import ContactPotential
+
+    return ContactPotential(scene)

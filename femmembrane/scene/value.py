@@ -25,9 +25,11 @@ from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source
 from ..physics.materials import Material
+from ..physics.obstacles import Obstacle
 from ..physics.named import material_data
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
+from .bodies import check_obstacles
 from .magnetisation import checked_magnetisation, refuse_magnetisation
 from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
@@ -97,6 +99,8 @@ class Scene:
         The chamber of gas behind the membrane, for runs by amounts of gas and verdicts at a held amount.
     electric : Electric, optional
         A voltage or a charge on the faces of the membrane. Without one nothing electric is built.
+    obstacles : sequence of Obstacle
+        Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
 
     Raises
     ------
@@ -139,6 +143,7 @@ class Scene:
     remanence_transport: str | None = None
     chamber: Chamber | None = None
     electric: Electric | None = None
+    obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -161,6 +166,10 @@ class Scene:
             _check_interface(
                 "electric", self.electric, ("voltage", "plain", "covers"), "an Electric is allowed, such as Electric(voltage=0.3)"
             )
+        obstacles = sequence("obstacle", self.obstacles, "a list of obstacles is allowed, such as [Plane(height=0.5)]")
+        for k, body in enumerate(obstacles):
+            allowed = "an obstacle is allowed, such as Plane(height=0.5)"
+            _check_interface(item_path("obstacle", k, len(obstacles)), body, ("pieces", "touch", "facing"), allowed)
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _check_interface("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
         store(
@@ -168,6 +177,7 @@ class Scene:
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
             loads=loads,
+            obstacles=obstacles,
             susceptibility=_susceptibility("membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=switch("effects.tension_field", self.tension_field),
@@ -187,6 +197,8 @@ class Scene:
         self._check_sources(lift)
         self._check_hubs()
         self._check_run()
+        if self.bodies:
+            check_obstacles(self, lift)
 
     def _check_run(self) -> None:
         """A run over a number has that number, and gas has its chamber."""
@@ -276,6 +288,12 @@ class Scene:
     def open(self) -> bool:
         """Whether the elements are still to be chosen, for the accuracy that is asked for: nothing can be computed before."""
         return bool(getattr(self.mesh, "open", False))
+
+    @property
+    def bodies(self) -> tuple[Obstacle, ...]:
+        """What the membrane cannot enter: the obstacles, and the bodies of sources that bring theirs."""
+        own = (getattr(source, "obstacle", None) for source in self.sources)
+        return (*self.obstacles, *(body for body in own if body is not None))
 
     @property
     def element_ends(self) -> tuple[float, ...]:

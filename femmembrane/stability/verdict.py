@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -49,10 +50,12 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
+    mass, constraint = evaluation.reduced_mass(potential.mass), None if constraint is None else evaluation.reduced(constraint)
     found = smallest_of(
-        pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid, evaluation.spring),
-        guess,
+        pencil_of(evaluation.band, mass, potential.space.half_bandwidth, constraint, soft, potential.rigid, evaluation.spring),
+        None if guess is None else evaluation.reduced(guess),
     )
+    found = replace(found, mode=evaluation.expanded(found.mode))
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)

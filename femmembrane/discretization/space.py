@@ -9,6 +9,7 @@ evaluating and assembling are one matrix product each.
 
 from __future__ import annotations
 
+import copy
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any, cast
@@ -81,6 +82,24 @@ class Space(Numbering):
         self._gather_flat = self.gather.ravel()
         self._known_ends: dict[int, tuple[int, int, float, float]] = {}
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
+
+    def with_moved(self, places: tuple[tuple[int, float], ...]) -> Space:
+        """The same space with some ends of elements at other places along the meridian: the numbering stays.
+
+        Parameters
+        ----------
+        places : tuple of (int, float)
+            Numbers of ends and their places.
+        """
+        moved: Space = copy.copy(self)
+        for name in [name for name in vars(moved) if isinstance(getattr(type(moved), name, None), cached_property)]:
+            del moved.__dict__[name]
+        ends = self.ends.copy()
+        for k, s in places:
+            ends[k] = s
+        moved._place(ends)
+        moved._known_ends = {}
+        return moved
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
@@ -362,7 +381,21 @@ def space_of(
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch)
+    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, getattr(scene, "borders", ()))
+
+
+@lru_cache(maxsize=32)
+def moved_space_of(
+    mesh: Meridian,
+    degree: int,
+    anchored: frozenset[str],
+    ends: tuple[float, ...],
+    prestretch: float,
+    borders: tuple[tuple[int, float], ...],
+) -> Space:
+    """The space of a mesh and a degree with some ends of elements elsewhere, see :meth:`Space.with_moved`."""
+    space = space_of(mesh, degree, anchored, ends, prestretch)
+    return space.with_moved(borders) if borders else space
 
 
 def anchored(scene: Any) -> frozenset[str]:

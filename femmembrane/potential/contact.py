@@ -23,15 +23,17 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor
 from ..kernels.interface import Array, Border, Factor, Step
 from ..physics.obstacles import ROUND_OFF
 from ..threads import cached_property
-from .potential import Evaluation, Potential
+from .potential import Evaluation, Potential, potential_of
 
 if TYPE_CHECKING:
+    from ..discretization.space import Space
     from ..scene import Scene
 
 #: force that holds a node, over the largest forces that meet at a node, that is round-off
@@ -39,7 +41,11 @@ NO_FORCE = 1e-11
 #: part of its neighbour's normal by which a node must be able to move for a body to hold it
 _ACROSS = 1e-6
 
+#: potentials on moved meshes that are kept
+_KEPT = 8
+
 Mask = NDArray[np.bool_]
+Borders = tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -204,6 +210,13 @@ class ContactEvaluation(Evaluation):
             self._band = self.reduction.band(band, kd)
         return self._band
 
+    def carried(self, v: Array) -> Array:
+        return cast(ContactPotential, self.potential).carried(v)
+
+    def row(self, row: Array) -> Array:
+        potential = cast(ContactPotential, self.potential)
+        return np.asarray(row @ potential.to_root) if potential.borders else row
+
     def reduced(self, v: Array) -> Array:
         return self.reduction.reduced(v)
 
@@ -234,13 +247,58 @@ class ContactPotential(Potential):
     """The potential of a scene with obstacles. Which nodes are held in a state follows from the state itself."""
 
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
+        if scene.borders:
+            self.root = cast(ContactPotential, potential_of(scene.bordered(())))
+            self._like = self.root
+        else:
+            self.root = self
         super().__init__(scene, quadrature)
         self.obstacles = scene.bodies
+        self._moved: dict[Borders, ContactPotential] = {}
 
     @property
     def unsettled(self) -> bool:
         """Whether the set of held nodes is still to be found by a corrector."""
         return True
+
+    @property
+    def borders(self) -> Borders:
+        """Ends of elements that stand at borders of contact, and their places."""
+        return self.scene.borders
+
+    def bordered(self, borders: Borders) -> ContactPotential:
+        """The potential on the mesh that has ends of elements at borders of contact. The last ones are kept."""
+        root = self.root
+        if not borders:
+            return root
+        known = root._moved.pop(borders, None)
+        if known is None:
+            known = ContactPotential(root.scene.bordered(borders))
+        root._moved[borders] = known
+        if len(root._moved) > _KEPT:
+            root._moved.pop(next(iter(root._moved)), None)
+        return known
+
+    @cached_property
+    def to_root(self) -> sparse.csr_matrix:
+        """The map from coefficients here to those on the mesh of the scene, by interpolation."""
+        return _interpolation(self.space, self.root.space)
+
+    @cached_property
+    def from_root(self) -> sparse.csr_matrix:
+        """The map from coefficients on the mesh of the scene to those here, by interpolation."""
+        return _interpolation(self.root.space, self.space)
+
+    @cached_property
+    def movable(self) -> Mask:
+        """Which ends of elements can be moved: inside the meridian, and where it is smooth."""
+        space, ends = self.root.space, self.root.space.ends
+        found = np.zeros(ends.size, dtype=bool)
+        if space.n_elements > 1:
+            kinks = space._ends_of_elements[3][: space.n_elements - 1]
+            found[1:-1] = kinks < 1e-6
+            found[space.breaks] = False
+        return found
 
     @cached_property
     def nodes(self) -> NDArray[np.int64]:
@@ -354,6 +412,10 @@ class ContactPotential(Potential):
         """The smooth potential on a set of held nodes."""
         return Held(self, held)
 
+    def carried(self, v: Array) -> Array:
+        """A displacement here in the coefficients on the mesh of the scene."""
+        return np.asarray(self.to_root @ v) if self.borders else v
+
     def touching(self, x: Array) -> float:
         """The least gap of a state at its nodes."""
         return float(self.gaps(x).gap.min(initial=np.inf))
@@ -395,3 +457,24 @@ class Held(ContactPotential):
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         raw = Potential.evaluate(self, x, pressure, magnetic)
         return ContactEvaluation(raw, self, self.gaps(raw.x), self.held)
+
+
+def _interpolation(space: Space, onto: Space) -> sparse.csr_matrix:
+    """The map between coefficients of two spaces with the same numbering, whose coefficients are values at their nodes."""
+    n, s = space.n_free, onto.node_parameters()
+    element, xi = space.locate(s)
+    value = space.shape_functions(xi)[0]
+    n_local = space.degree + 1
+    target = onto.numbers[onto.nodes]
+    if onto.closed:
+        s, element, value, target = s[:-1], element[:-1], value[:-1], target[:-1]
+    rows, columns, entries = [], [], []
+    for field in (0, 1):
+        source = space.gather[field * n_local : (field + 1) * n_local, element].T
+        row = np.broadcast_to(target[: len(source), field][:, None], source.shape)
+        keep = (row < n) & (source < n) & (value != 0)
+        rows.append(row[keep])
+        columns.append(source[keep])
+        entries.append(value[keep])
+    shape = n, n
+    return sparse.csr_matrix((np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

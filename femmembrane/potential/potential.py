@@ -140,6 +140,14 @@ class Evaluation:
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
 
+    def carried(self, v: Array) -> Array:
+        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
+        return v
+
+    def row(self, row: Array) -> Array:
+        """A linear form of :meth:`carried` displacements as one of displacements here."""
+        return row
+
     def reduced(self, v: Array) -> Array:
         """A vector, or columns, in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
         return v
@@ -208,6 +216,8 @@ class Potential:
     #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
     obstacles: tuple[Obstacle, ...] = ()
     unsettled = False
+    #: a potential with the same expressions on other points
+    _like: Potential | None = None
 
     @BUILDING
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
@@ -219,6 +229,8 @@ class Potential:
             if quadrature is None
             else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch)
         )
+        if borders := getattr(scene, "borders", ()):
+            self.space = self.space.with_moved(borders)
         space = self.space
         self.sheet = Sheet.of(scene)
         if not space.n_free:
@@ -256,9 +268,13 @@ class Potential:
             if lift is not None:
                 columns |= {name: part for name, part in zip(names, space.lifting_of(lift), strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
-        with casadi_answers_numpy():
-            given = scene, self.sources, self.loads, tuple(columns), space, forces
-            self.symbols, self.terms = expressions_of(point_expressions, *given)
+        if (like := self._like) is not None:
+            self.symbols, self.terms = like.symbols, like.terms
+            self.__dict__["point_function"] = like.point_function
+        else:
+            with casadi_answers_numpy():
+                given = scene, self.sources, self.loads, tuple(columns), space, forces
+                self.symbols, self.terms = expressions_of(point_expressions, *given)
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
 
@@ -372,7 +388,7 @@ class Potential:
 
     @cached_property
     def _point(self) -> PointProgram:
-        return PointProgram(self.point_function, self.point_data)
+        return PointProgram(self.point_function, self.point_data, None if self._like is None else self._like._point)
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""

@@ -101,6 +101,9 @@ class Scene:
         A voltage or a charge on the faces of the membrane. Without one nothing electric is built.
     obstacles : sequence of Obstacle
         Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
+    borders : tuple of (int, float)
+        Found with an equilibrium in contact, and not to be given: ends of elements that stand at the borders of contact, by their numbers,
+        with their places along the meridian.
 
     Raises
     ------
@@ -144,6 +147,7 @@ class Scene:
     chamber: Chamber | None = None
     electric: Electric | None = None
     obstacles: tuple[Obstacle, ...] = ()
+    borders: tuple[tuple[int, float], ...] = field(default=(), repr=False, metadata={"found": True})
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -319,6 +323,20 @@ class Scene:
             plain, start=None if plain.start == ends[0] else plain.start, stop=None if plain.stop == ends[1] else plain.stop
         )
 
+    def bordered(self, borders: tuple[tuple[int, float], ...]) -> Self:
+        """The same scene with some ends of its elements where contact begins or ends: a solver finds them, and nothing is checked.
+
+        Parameters
+        ----------
+        borders : tuple of (int, float)
+            Numbers of ends of elements, and their places along the meridian.
+        """
+        if borders == self.borders:
+            return self
+        made = object.__new__(type(self))
+        made.__dict__.update(self.__dict__, borders=borders)
+        return made
+
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.
 
@@ -340,6 +358,8 @@ class Scene:
                 raise InputError(name, value, unknown_name(name, name, known).allowed)
         if changes.get("scales") is not None:
             changes.setdefault("radius_to_thickness", None)
+        if changes.keys() & {"mesh", "degree", "thickness", "modulus", "remanence", "obstacles", "sources"}:
+            changes.setdefault("borders", ())
         if getattr(changes.get("mesh"), "open", False):
             changes.setdefault("degree", None)
         return dataclasses.replace(self, **changes)

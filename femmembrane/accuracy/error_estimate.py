@@ -60,7 +60,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     if found is None:
         return _without(control, values, method, reason)
     better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
-    return _compared(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better), method, reason)
+    return _compared(control, values, _numbers(finer, found.evaluation.x, found.pressure, found.evaluation, better), method, reason)
 
 
 def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evaluation, verdicts: Mapping[str, Verdict]) -> dict[str, float]:

@@ -213,6 +213,11 @@ class ContactEvaluation(Evaluation):
     def carried(self, v: Array) -> Array:
         return cast(ContactPotential, self.potential).carried(v)
 
+    def brought(self, v: Array) -> Array:
+        potential, n = cast(ContactPotential, self.potential), self.potential.space.n_free
+        own = potential.from_root @ v[:n] if potential.borders else v[:n]
+        return np.concatenate([self.reduction.projected(own), v[n:]])
+
     def row(self, row: Array) -> Array:
         potential = cast(ContactPotential, self.potential)
         return np.asarray(row @ potential.to_root) if potential.borders else row

@@ -144,6 +144,10 @@ class Evaluation:
         """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
         return v
 
+    def brought(self, v: Array) -> Array:
+        """A displacement on the mesh of the scene here, with what may stand behind it."""
+        return v
+
     def row(self, row: Array) -> Array:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row

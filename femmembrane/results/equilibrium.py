@@ -221,7 +221,7 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        space = self.potential.space
+        space = self.potential.space if not self.scene.borders or r is not None else self.in_scene(self.scene.bordered(())).potential.space
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
         return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
 

@@ -35,6 +35,8 @@ _ARRIVED = 1e-9
 _BALANCED = 1e-13
 #: least share of an element that a border leaves of it
 _LEAST = 0.1
+#: elements in a zone of contact from which on its borders are followed
+_FEWEST = 2
 #: how far beyond the middle between two ends a border may be, over the size of an element, before the other one follows it
 _BEYOND = 0.02
 #: forces that pull, over the largest, and gaps inside a body, over the size of the membrane, that a border in its place may leave
@@ -67,10 +69,11 @@ def settled(once: Once, control: Control, potential: Potential, x: Array, pressu
     x = np.ascontiguousarray(x, dtype=float)
     root, x = given.root, given.carried(x)
     result = _on_mesh(once, control, root, x, pressure, magnetic)
-    if result.status is not Status.CONVERGED:
+    followed = _with_borders(once, control, root, result) if result.status is Status.CONVERGED else None
+    if followed is None:
         return result
-    followed = _with_borders(once, control, root, result)
-    return result if followed is None else followed
+    followed.x = followed.evaluation.carried(followed.x)
+    return followed
 
 
 def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pressure: float, magnetic: float) -> NewtonResult:
@@ -186,12 +189,10 @@ def _assigned(root: ContactPotential, zones: list[tuple[int, int]], places: Arra
         if len(sides) == 2 and not own[0] < own[1]:
             return None
         numbers = [int(np.abs(ends - s).argmin()) for s in own]
-        if len(numbers) == 2 and numbers[0] == numbers[1]:
-            numbers[int(own[1] >= ends[numbers[0]])] += 1 if own[1] >= ends[numbers[0]] else -1
-        if len(numbers) == 1 and numbers[0] == 0:
-            numbers[0] = 1
-        if len(numbers) == 1 and numbers[0] == ends.size - 1:
-            numbers[0] = ends.size - 2
+        first = numbers[0] if sides[0] is False else 0
+        last = numbers[-1] if sides[-1] else ends.size - 1
+        if last - first < _FEWEST:  # the membrane about so small a zone is not resolved, wherever the ends are
+            return None
         borders += [Border(number, side) for number, side in zip(numbers, sides, strict=True)]
     taken = [border.end for border in borders]
     if len(set(taken)) < len(taken) or not all(0 < number < ends.size - 1 and root.movable[number] for number in taken):

@@ -68,6 +68,8 @@ class BranchPoint:
         Unit derivative of z with respect to arc length, and the inner product with it as a row.
     sigma : float
         Arc length.
+    own : ndarray or None
+        The tangent on the mesh of the state, where that follows borders of contact.
     """
 
     state: State
@@ -75,6 +77,7 @@ class BranchPoint:
     tangent: Array
     dual: Array
     sigma: float
+    own: Array | None = field(default=None, kw_only=True)
 
     def value(self, quantity: Followed) -> float:
         """A quantity of the curve: volume, pressure or center_height by its name, or the amount of a gas."""
@@ -87,8 +90,8 @@ class BranchPoint:
     def rate_of(self, controlled: Controlled) -> float:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
         state, n = self.state, len(self.state.x)
-        space = state.evaluation.potential.space
-        return controlled.rate(space, state.pressure, state.evaluation, self.tangent[:n], float(self.tangent[n]))
+        space, tangent = state.evaluation.potential.space, self.tangent if self.own is None else self.own
+        return controlled.rate(space, state.pressure, state.evaluation, tangent[:n], float(tangent[n]))
 
 
 Point = TypeVar("Point", bound=BranchPoint)

@@ -37,6 +37,7 @@ PRESSURE = 1e-9
 class NewtonResult:
     """Where the corrector ended.
 
+    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders of contact where there are any, with ``bordered``.
     ``correction`` is the relative size of the Newton correction at x by ``bordered``, the last factors, at x or one correction before;
     ``residual`` and ``gap`` are evaluated at x.
     """

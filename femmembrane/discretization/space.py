@@ -41,6 +41,8 @@ class Space(Numbering):
 
     Attributes
     ----------
+    nodal : bool
+        Whether all coefficients are values at :meth:`.Numbering.interpolation_points`, for degrees from 3 on too.
     table : ndarray, shape (4 n_quadrature, 2 (degree + 1))
         (u, u_x, w, w_x) at the quadrature points of an element from its coefficients.
     highest : ndarray, shape (n_quadrature,)
@@ -55,8 +57,10 @@ class Space(Numbering):
         anchored: frozenset[str] = frozenset(),
         ends: tuple[float, ...] = (),
         prestretch: float = 1.0,
+        nodal: bool = False,
     ) -> None:
         super().__init__(mesh, degree, quadrature, anchored, ends, prestretch)
+        self.nodal = nodal and degree > 2  # up to degree 2 the coefficients are values at the nodes anyway
         self._tabulate()
 
     def _tabulate(self) -> None:
@@ -103,7 +107,11 @@ class Space(Numbering):
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
-        return shape_functions(self.degree, xi)
+        value, slope = shape_functions(self.degree, xi)
+        if not self.nodal:
+            return value, slope
+        at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
+        return value @ at_nodes, slope @ at_nodes
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
@@ -373,15 +381,20 @@ class Space(Numbering):
 
 @lru_cache(maxsize=32)
 def space_of(
-    mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset(), ends: tuple[float, ...] = (), prestretch: float = 1.0
+    mesh: Meridian,
+    degree: int,
+    anchored: frozenset[str] = frozenset(),
+    ends: tuple[float, ...] = (),
+    prestretch: float = 1.0,
+    nodal: bool = False,
 ) -> Space:
     """The space of a mesh and a degree, built once."""
-    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch)
+    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch, nodal=nodal)
 
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, getattr(scene, "borders", ()))
+    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies))
 
 
 @lru_cache(maxsize=32)
@@ -392,9 +405,10 @@ def moved_space_of(
     ends: tuple[float, ...],
     prestretch: float,
     borders: tuple[tuple[int, float], ...],
+    nodal: bool,
 ) -> Space:
     """The space of a mesh and a degree with some ends of elements elsewhere, see :meth:`Space.with_moved`."""
-    space = space_of(mesh, degree, anchored, ends, prestretch)
+    space = space_of(mesh, degree, anchored, ends, prestretch, nodal)
     return space.with_moved(borders) if borders else space
 
 

@@ -252,19 +252,29 @@ class ContactPotential(Potential):
     """The potential of a scene with obstacles. Which nodes are held in a state follows from the state itself."""
 
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
+        self._root: ContactPotential | None = None
         if scene.borders:
-            self.root = cast(ContactPotential, potential_of(scene.bordered(())))
-            self._like = self.root
-        else:
-            self.root = self
+            self._root = cast(ContactPotential, potential_of(scene.bordered(())))
+            self._like = self._root
         super().__init__(scene, quadrature)
         self.obstacles = scene.bodies
         self._moved: dict[Borders, ContactPotential] = {}
 
     @property
-    def unsettled(self) -> bool:
+    def root(self) -> ContactPotential:
+        return self._root or self
+
+    @property
+    def unsettled(self) -> bool:  # type: ignore[override]  # read only here, and there
         """Whether the set of held nodes is still to be found by a corrector."""
         return True
+
+    @cached_property
+    def without_bodies(self) -> Potential:
+        """The potential of the same membrane with nothing in its way."""
+        bare: Potential = object.__new__(Potential)
+        bare.__dict__.update(self.root.__dict__, obstacles=())
+        return bare
 
     @property
     def borders(self) -> Borders:
@@ -437,7 +447,7 @@ class Held(ContactPotential):
     """
 
     def __init__(self, base: ContactPotential, held: Mask) -> None:
-        self.__dict__.update(base.__dict__)
+        self.__dict__.update(base.__dict__, _root=base.root)
         self.base, self.held = base, held
 
     @property

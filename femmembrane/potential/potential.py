@@ -227,11 +227,11 @@ class Potential:
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        ends, stretch = scene.element_ends, scene.prestretch
+        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "bodies", ()))
         self.space = (
-            space_of(scene.mesh, scene.degree, fixed, ends, stretch)
+            space_of(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
             if quadrature is None
-            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch)
+            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch, nodal)
         )
         if borders := getattr(scene, "borders", ()):
             self.space = self.space.with_moved(borders)
@@ -289,6 +289,11 @@ class Potential:
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
         return 0.0
+
+    @property
+    def root(self) -> Potential:
+        """The potential on the mesh of the scene: this one, unless ends of elements follow borders of contact."""
+        return self
 
     @property
     def surrounded(self) -> bool:

@@ -73,7 +73,5 @@ def _refuse_effects(scene: Scene) -> None:
         raise InputError("effects.tension_field", True, "false is allowed with an obstacle: wrinkles against a body are not computed")
     if scene.electric is not None and scene.electric.total_charge is not None:
         raise InputError("electric.total_charge", scene.electric.total_charge, "a voltage is allowed with an obstacle")
-    if scene.degree is not None and scene.degree > 2:
-        raise InputError("mesh.degree", scene.degree, "1 or 2 is allowed with an obstacle")
     if scene.run is not None and getattr(scene.run, "number", None) is not None:
         raise InputError("run.over" if scene.run.over else "run.control", scene.run.number, f"not over a number beside an {key}")

@@ -13,7 +13,7 @@ border, solved by Broyden's method. Its forces converge at twice the order of th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 
@@ -23,7 +23,9 @@ from .controls import ArcLengthControl, CarriedArcLength, Control
 
 if TYPE_CHECKING:
     from ..potential.contact import ContactEvaluation, ContactPotential, Mask
+    from .continuation import BranchPoint
     from .newton import NewtonResult
+    from .segment import Located, Segment
 
 #: sets of held nodes that are tried
 MOST_SETS = 60
@@ -318,3 +320,33 @@ def on_borders(control: Control, potential: ContactPotential) -> Control:
         np.asarray(control.dual @ potential.to_root), control.dual_pressure, control.prediction, control.predicted_pressure, offset
     )
 
+
+def contact_events(segment: Segment[Any]) -> list[Located[Any]]:
+    """The points of a segment where a body is touched first, or let go last.
+
+    There the force on the body is zero, and the least gap before: one function, negative before the touch and positive after it, has its
+    root there.
+    """
+    potential = segment.problem.potential
+    if segment.leaving or not potential.obstacles:
+        return []
+    found = []
+    for k in range(len(potential.obstacles)):
+
+        def pressed(point: BranchPoint, k: int = k) -> float:
+            return _pressed(point.state.evaluation, k)
+
+        before, after = pressed(segment.a), pressed(segment.b)
+        if before * after < 0 or (after == 0 and before != 0):
+            found.append(segment.root("touch" if after > before else "release", pressed, 0.0, 1.0))
+    return found
+
+
+def _pressed(evaluation: Any, body: int) -> float:
+    """The force on a body, or less its least gap where it is not touched."""
+    own = evaluation.gaps.body == body
+    held = evaluation.held & own
+    if held.any():
+        return float(np.abs(evaluation.forces[held]).sum())
+    rho, eta = evaluation.potential.positions(evaluation.x)
+    return -float(evaluation.potential.obstacles[body].gap(rho, eta).min())

@@ -32,8 +32,6 @@ _MAX_ITERATIONS = 30
 
 def finer_scene(scene: Scene) -> Scene:
     """The scene on elements of one degree more, or of half the size where there is no higher degree."""
-    if scene.bodies:  # nodes inside elements of higher degree are no values
-        return scene.replace(mesh=scene.mesh.refined())
     return scene.replace(degree=scene.degree + 1) if scene.degree < MAX_DEGREE else scene.replace(mesh=scene.mesh.refined())
 
 

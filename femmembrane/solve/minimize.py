@@ -151,7 +151,7 @@ def minimize_and_verify(
     NewtonResult
         Status NOT_A_MINIMUM when forces balance but the second variation has a negative direction under this control.
     """
-    if potential.charged is not None:  # its second derivatives are full: Newton's method, and our own check
+    if potential.charged is not None or potential.obstacles:  # its second derivatives are full: Newton's method, and our own check
         result = correct(potential, control, x, pressure, magnetic=magnetic, damped=True)
         if result.status is Status.CONVERGED and not is_minimum(potential, control, result.evaluation):
             result.status = Status.NOT_A_MINIMUM

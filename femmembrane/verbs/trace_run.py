@@ -18,6 +18,7 @@ from ..scene import Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
 from ..solve.branch import BranchProblem, first_point, oriented_point
+from ..solve.active_set import contact_events
 from ..solve.contact import stopped_by_source, touches_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS
@@ -372,7 +373,7 @@ class TraceRun(Run[Branch]):
         with self.timed("special_points"):
             located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
             crossed = self.crossed(segment)
-            for fold in sorted(located + crossed, key=lambda f: f.point.sigma):
+            for fold in sorted(located + crossed + contact_events(segment), key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
             return self.closing(segment, crossed, last)
@@ -407,7 +408,10 @@ class TraceRun(Run[Branch]):
             if verdict.smallest_eigenvalue * after.verdict(azimuthal=n).smallest_eigenvalue < 0:  # False where either is NaN (short-wave)
 
                 def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
-                    return azimuthal_eigenvalue(self.potential_at(point), point.state.x, point.state.pressure, n, guess).value
+                    potential, own = self.potential_at(point), point.state.evaluation
+                    if potential.obstacles:
+                        potential = own.potential
+                    return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
 
                 with self.timed("special_points"):
                     self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))

@@ -18,6 +18,7 @@ from ..solve.controls import control_kind
 from ..solve.newton import relative_residual
 from ..threads import one_thread
 from . import door
+from .contact import Contact, contact_of
 
 if TYPE_CHECKING:
     from ..potential import Evaluation, Potential
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
-_OF_POTENTIAL = ("verdict", "errors", "tangent")
+_OF_POTENTIAL = ("verdict", "errors", "tangent", "contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +143,13 @@ class Equilibrium:
 
         return potential_of(self.scene)
 
+    @property
+    def contact(self) -> Contact | None:
+        """Contact with the bodies of the scene, see :class:`~femmembrane.results.contact.Contact`; None where it has none."""
+        if not self.scene.bodies:
+            return None
+        return self.remembered(("contact",), lambda: contact_of(self.potential.evaluate(self.state, self.pressure)))
+
     def number(self, name: str) -> float:
         """A number of its scene.
 
@@ -223,7 +231,10 @@ class Equilibrium:
         """
         space = self.potential.space if not self.scene.borders or r is not None else self.in_scene(self.scene.bordered(())).potential.space
         s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
-        return door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        if (contact := self.contact) is not None:
+            columns |= {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
+        return columns
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.

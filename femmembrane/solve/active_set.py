@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import numpy as np
 
 from ..errors import Status
+from ..physics.loads import over_projection
 from ..potential import Array, Potential
 from .controls import ArcLengthControl, CarriedArcLength, Control
 
@@ -298,8 +299,23 @@ def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
         forces = space.table.T @ (density[0][:, element] - result.pressure * density[1][:, element])
         node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
         n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
-        found.append((forces[local] * n_rho + forces[space.degree + 1 + local] * n_eta) / scale)
+        along, across = _at_end(potential, evaluation, result.pressure, border)
+        found.append(((forces[local] - along) * n_rho + (forces[space.degree + 1 + local] - across) * n_eta) / scale)
     return np.array(found)
+
+
+def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure: float, border: Border) -> tuple[float, float]:
+    """What the forms of the volume, and of loads over the projected area, have at the end of an element beside the force over it.
+
+    They count the volume below an element, or beside it, so that its variation has a part at its ends. Two neighbours' parts cancel.
+    """
+    space = potential.space
+    rho, eta = space.end_position(evaluation.x, border.end)
+    turn = 2 * np.pi * space.side * (-1.0 if border.before else 1.0)  # the element beyond the border begins, or ends, there
+    load = evaluation.factor * float(over_projection(potential.loads, np.array(eta))[0]) if potential.loads else 0.0
+    if space.lids:
+        return turn * load * rho, turn * pressure * rho**2 / 2
+    return turn * (load - pressure * eta) * rho, 0.0
 
 
 def _in_place(evaluation: ContactEvaluation) -> bool:

@@ -382,7 +382,8 @@ class Mould(Obstacle):
             if abs(cross) < 1e-14 and dot > 0:
                 continue
             tangent = math.tan(math.atan2(abs(cross), dot) / 2)
-            cut[k] = min(self.rounding * tangent, lengths[k - 1] / 2, lengths[k] / 2)
+            room = lengths[k - 1] / (1 if k == 1 else 2), lengths[k] / (1 if k == len(p) - 2 else 2)  # two corners share a piece
+            cut[k] = min(self.rounding * tangent, *room)
             radius = cut[k] / tangent if tangent > 0 else 0.0
             toward = 1.0 if cross > 0 else -1.0  # the centre is to the left of the walk where it turns left
             center = p[k] - cut[k] * d + radius * toward * np.array([-d[1], d[0]])

@@ -18,9 +18,11 @@ of that.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -28,7 +30,7 @@ from scipy import sparse
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor
 from ..kernels.interface import Array, Border, Factor, Step
-from ..physics.obstacles import ROUND_OFF
+from ..physics.obstacles import ROUND_OFF, Straight
 from ..threads import cached_property
 from .potential import Evaluation, Potential, potential_of
 
@@ -41,6 +43,8 @@ NO_FORCE = 1e-11
 #: part of its neighbour's normal by which a node must be able to move for a body to hold it
 _ACROSS = 1e-6
 
+#: keeps the distance from a centre differentiable
+_TINY = 1e-300
 #: potentials on moved meshes that are kept
 _KEPT = 8
 
@@ -221,6 +225,9 @@ class ContactEvaluation(Evaluation):
     def row(self, row: Array) -> Array:
         potential = cast(ContactPotential, self.potential)
         return np.asarray(row @ potential.to_root) if potential.borders else row
+
+    def holds(self, unknown: int) -> bool:
+        return bool((self.reduction.out == unknown).any())
 
     def reduced(self, v: Array) -> Array:
         return self.reduction.reduced(v)
@@ -472,6 +479,45 @@ class Held(ContactPotential):
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         raw = Potential.evaluate(self, x, pressure, magnetic)
         return ContactEvaluation(raw, self, self.gaps(raw.x), self.held)
+
+
+def gap_rows(potential: ContactPotential, y: ca.MX, p: ca.MX) -> ca.MX:
+    """Gaps at the nodes over the size of the membrane, as functions of scaled unknowns y (scales p[2], p[3])."""
+    R, Z = potential._rest
+    (iu, iw), n = potential.place, potential.space.n_free
+    padded = ca.vertcat(y, 0)
+    rho = ca.DM(R) + p[2] * padded[np.minimum(iu, n).tolist()]
+    eta = ca.DM(Z) + p[3] * padded[np.minimum(iw, n).tolist()]
+    one, other = ca.SX.sym("rho"), ca.SX.sym("eta")
+    least = _gap_expression(potential, one, other)
+    function = ca.Function("gap", [one, other], [least / potential.space.unit])
+    return function.map(int(R.size))(rho.T, eta.T).T
+
+
+def _gap_expression(potential: ContactPotential, rho: ca.SX, eta: ca.SX) -> ca.SX:
+    """The least gap of a point from all bodies: that of the nearest piece of each."""
+    gaps = []
+    for body in potential.obstacles:
+        best, far = ca.SX(ca.inf), ca.SX(ca.inf)
+        for piece in body.pieces():
+            if isinstance(piece, Straight):
+                x, y = rho - piece.start[0], eta - piece.start[1]
+                gap, place = x * piece.normal[0] + y * piece.normal[1], x * piece.along[0] + y * piece.along[1]
+                inside = ca.logic_and(place >= piece.low, place <= piece.high)
+                if math.isinf(piece.low) and math.isinf(piece.high):
+                    inside = ca.SX(1)
+            else:
+                x, y = rho - piece.center[0], eta - piece.center[1]
+                distance = ca.sqrt(x**2 + y**2 + _TINY)
+                gap = piece.side * (distance - piece.radius)
+                inside = ca.SX(1) if piece.cosine < -1 else x * piece.middle[0] + y * piece.middle[1] >= piece.cosine * distance
+            nearer = ca.logic_and(inside, ca.fabs(gap) < far)
+            best, far = ca.if_else(nearer, gap, best), ca.if_else(nearer, ca.fabs(gap), far)
+        gaps.append(best)
+    least = gaps[0]
+    for gap in gaps[1:]:
+        least = ca.fmin(least, gap)
+    return least
 
 
 def _interpolation(space: Space, onto: Space) -> sparse.csr_matrix:

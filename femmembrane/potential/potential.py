@@ -152,6 +152,10 @@ class Evaluation:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row
 
+    def holds(self, unknown: int) -> bool:
+        """Whether a body keeps an unknown from changing."""
+        return False
+
     def reduced(self, v: Array) -> Array:
         """A vector, or columns, in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
         return v

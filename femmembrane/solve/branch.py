@@ -98,6 +98,9 @@ class BranchProblem(CurveProblem[BranchPoint]):
         solved = factor.solve(point.state.evaluation.volume_gradient)
         return factor.determinant_sign() * (1 if row[-1] + point.state.evaluation.row(row[:-1]) @ solved > 0 else -1)
 
+    def stays(self, quantity: Followed, point: BranchPoint) -> bool:
+        return quantity == "center_height" and point.state.evaluation.holds(self.potential.space.pole)
+
     def forbids(self, before: BranchPoint, after: BranchPoint) -> bool:
         return self.potential.passed_source(before.state.x, after.state.x)
 

@@ -27,6 +27,8 @@ CORNER = 100.0
 ROUND_OFF = 1e-14
 #: times the error of a point that a prediction from the points before may miss
 _BOTH_ENDS = 10.0
+#: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
+_MOVING = 0.02
 
 
 @dataclass(frozen=True)
@@ -171,6 +173,10 @@ class CurveProblem(ABC, Generic[Point]):
         """The state at rest if it lies between two points and no corrector finds it."""
         return None
 
+    def stays(self, quantity: Followed, point: Point) -> bool:
+        """Whether a quantity cannot change at a point, so that its rate of zero is no fold."""
+        return False
+
     def place(self, point: Point) -> str:
         """Where a point is, for messages."""
         return f"V = {point.state.volume:.9g}, P = {point.state.pressure:.9g}"
@@ -238,6 +244,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     known = max(tracer.known, new.state.correction)
     if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
+    if new.own is not None:
+        miss = max(miss - _MOVING, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)

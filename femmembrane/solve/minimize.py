@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import casadi as ca
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
+from ..potential.contact import gap_rows
 from ..potential.expressions import BUILDING
 from ..potential.replay import vectorise
 from ..threads import Guard
@@ -24,6 +25,9 @@ from .banded import negative_among
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, displaced
 from .state import displacement, distance
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
 from .wellposed import stress_free
 
 #: two states closer than this are the same, relative to the size of the displacement
@@ -98,13 +102,18 @@ class _Solver:
     Threads may share one: calls are answered one at a time.
     """
 
-    def __init__(self, function: ca.Function) -> None:
+    def __init__(self, function: ca.Function, gaps: int = 0) -> None:
         n, m = function.numel_in(0), function.numel_out(2)
         self._lock = Guard()
         self._x, self._parameters = np.zeros(n), np.zeros(6)
         self._target, self._multiplier = np.zeros(m), np.zeros(m)
         free = np.full(n, np.inf)
-        self._inputs = (self._x, self._parameters, -free, free, self._target, self._target, np.zeros(n), self._multiplier)
+        most = self._target
+        if gaps:  # the last rows, at least 0
+            self._most = np.full(m, np.inf)
+            most = self._most
+        self._gaps = gaps
+        self._inputs = (self._x, self._parameters, -free, free, self._target, most, np.zeros(n), self._multiplier)
         self._outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
         self._buffer, self._call = function.buffer()
         for k, array in enumerate(self._inputs):
@@ -118,10 +127,13 @@ class _Solver:
         with self._lock:
             self._x[:], self._parameters[:] = x, parameters
             if border is not None:
-                self._target[:], self._multiplier[:] = border
+                rows = slice(0, len(self._target) - self._gaps)
+                self._target[rows], self._multiplier[rows] = border
+                if self._gaps:
+                    self._most[rows] = border[0]
             self._call()
             stats = self._buffer.stats()
-            found, multiplier = self._outputs[0].copy(), self._outputs[4].copy()
+            found, multiplier = self._outputs[0].copy(), self._outputs[4][: len(self._target) - self._gaps].copy()
         return found, multiplier, int(stats.get("iter_count", 0)), str(stats["return_status"])
 
 
@@ -132,6 +144,8 @@ def _solver(potential: Potential, constrained: bool, max_iterations: int) -> _So
     y, p = ca.MX.sym("y", potential.space.n_free), ca.MX.sym("p", 6)
     problem = {"x": y, "p": p, "f": functions.value(y, p)}
     options = _OPTIONS | {"grad_f": functions.gradient, "ipopt": _OPTIONS["ipopt"] | {"max_iter": max_iterations}}
+    if potential.obstacles:
+        return _solver_with_bodies(cast("ContactPotential", potential), functions, problem, options, constrained)
     if constrained:
         problem["g"] = functions.volume(y, p)
         options |= {"jac_g": functions.volume_gradient, "hess_lag": functions.hessian}
@@ -139,6 +153,25 @@ def _solver(potential: Potential, constrained: bool, max_iterations: int) -> _So
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 0)
         options["hess_lag"] = ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [functions.hessian(y, p, lam_f, 0.0)])
     return _Solver(ca.nlpsol("ipopt", "ipopt", problem, options))
+
+
+def _solver_with_bodies(
+    potential: ContactPotential, functions: NlpFunctions, problem: dict[str, Any], options: dict[str, Any], constrained: bool
+) -> _Solver:
+    """IPOPT with a gap >= 0 at every node, over the size of the membrane; the nodes of a guess are moved out of the bodies."""
+    y, p = problem["x"], problem["p"]
+    gaps = gap_rows(potential, y, p)
+    count = gaps.numel()
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", count + int(constrained))
+    first = lam_g[0] if constrained else 0.0
+    second, _ = ca.hessian(ca.dot(lam_g[int(constrained) :], gaps), y)
+    hessian = functions.hessian(y, p, lam_f, first) + ca.triu(second)
+    problem["g"] = ca.vertcat(functions.volume(y, p), gaps) if constrained else gaps
+    rows = [functions.volume_gradient(y, p)[1]] if constrained else []
+    options["ipopt"] = options["ipopt"] | {"bound_relax_factor": 0.0, "tol": 1e-11, "compl_inf_tol": 1e-11}
+    options["jac_g"] = ca.Function("nlp_jac_g", [y, p], [problem["g"], ca.vertcat(*rows, ca.jacobian(gaps, y))])
+    options["hess_lag"] = ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [hessian])
+    return _Solver(ca.nlpsol("ipopt", "ipopt", problem, options), count)
 
 
 def minimize_and_verify(
@@ -151,7 +184,7 @@ def minimize_and_verify(
     NewtonResult
         Status NOT_A_MINIMUM when forces balance but the second variation has a negative direction under this control.
     """
-    if potential.charged is not None or potential.obstacles:  # its second derivatives are full: Newton's method, and our own check
+    if potential.charged is not None:  # its second derivatives are full: Newton's method, and our own check
         result = correct(potential, control, x, pressure, magnetic=magnetic, damped=True)
         if result.status is Status.CONVERGED and not is_minimum(potential, control, result.evaluation):
             result.status = Status.NOT_A_MINIMUM

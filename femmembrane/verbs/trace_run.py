@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
+
+import numpy as np
 
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
@@ -33,6 +35,12 @@ from .meshing import carried
 from .over_number import gas_of
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
+
+#: first and smallest steps are shorter where a body is nearer to the membrane at rest than its size over this
+_ROOM = 10.0
 
 Start: TypeAlias = float | Equilibrium | SpecialPoint | Branch | None
 
@@ -198,7 +206,11 @@ class TraceRun(Run[Branch]):
         if GAS in request.targets:
             gas_of(scene, "until")
         self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
-        self.tracer = Tracer(Predictor(), request.steps.first, request.steps)
+        steps = request.steps
+        if self.potential.obstacles:  # a body next to the membrane at rest leaves it that much room
+            room = min(1.0, _ROOM * cast("ContactPotential", self.potential).touching(np.zeros(self.potential.space.n_free)) / self.potential.space.unit)
+            steps = replace(steps, first=steps.first * room, smallest=steps.smallest * room)
+        self.tracer = Tracer(Predictor(), steps.first, steps)
         self.special: list[SpecialPoint] | None = [] if request.special_points else None
         self.regular = self.made = 0
         self.unexplained: list[str] = []

@@ -1,7 +1,7 @@
 """An independent solver for a neo-Hookean disc below a rigid, frictionless plate: shooting from the border of contact.
 
-Nothing of the package is used. Against the plate the membrane is flat and stretched alike in both directions, by l0: there is no friction, and
-a disc under a uniform tension is in balance. From the border, at the reference radius A and the deformed radius a = l0 A, with the
+Nothing of the package is used. Against the plate the membrane is flat and stretched alike in both directions, by l0: there is no friction,
+and a disc under a uniform tension is in balance. From the border, at the reference radius A and the deformed radius a = l0 A, with the
 horizontal and vertical force of the meridian over the angle 1, F_rho and F_z,
 
     F_rho' = W_2 - P rho l1 sin(phi),     F_z = -P (rho^2 - a^2)/2,     (rho', eta') = l1 (F_rho, F_z)/|F|,     W_1(l1, l2) = |F|/R,

@@ -394,7 +394,9 @@ def space_of(
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies))
+    return moved_space_of(
+        scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies)
+    )
 
 
 @lru_cache(maxsize=32)

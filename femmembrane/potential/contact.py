@@ -1,10 +1,10 @@
 """The total potential of a membrane before rigid bodies: gap_i(x) >= 0 at the nodes.
 
-Why at nodes: the nodal forces of a uniform pressure are all positive there (1/6, 4/6, 1/6 of an element of degree 2), so that the sign of
-the force that holds a node is the sign of the pressure beside it. Each constraint then takes the normal displacement of one node and no
-more: with (u, w) = a t + b n at a held node, b = 0 is eliminated, and matrices keep their bands. Conditions at Gauss points, or weighed ones
-(mortar), couple the nodes of an element. The one exception is a pole. Its nodal force of a uniform pressure is zero from degree 2 on, as
-the weight R vanishes there. It is judged together with its neighbour.
+Why at nodes: the nodal forces of a uniform pressure are all positive there (1/6, 4/6, 1/6 of an element of degree 2), so that the sign
+of the force that holds a node is the sign of the pressure beside it. Each constraint then takes the normal displacement of one node and no
+more: with (u, w) = a t + b n at a held node, b = 0 is eliminated, and matrices keep their bands. Conditions at Gauss points, or weighed
+ones (mortar), couple the nodes of an element. The one exception is a pole. Its nodal force of a uniform pressure is zero from degree 2 on,
+as the weight R vanishes there. It is judged together with its neighbour.
 
 A node is *held* where the force on it exceeds its stiffness times its gap (the primal-dual active set of Hintermüller, Ito and Kunisch,
 SIAM J. Optim. 13 (2002)); at an equilibrium a held node has no gap and is pushed away from the body. On a fixed set of held nodes the
@@ -12,8 +12,8 @@ potential is a smooth one, :class:`Held`, with ::
 
     K = T^T (E'' - P V'' - sum force_i curvature_i t t^T) T,        force_i = n . (E' - P V')
 
-where T leaves the tangential displacements of the held nodes. All that is asked of a potential, Newton steps, inertia, eigenvalues, is asked
-of that.
+where T leaves the tangential displacements of the held nodes. All that is asked of a potential, Newton steps, inertia, eigenvalues, is
+asked of that.
 """
 
 from __future__ import annotations
@@ -90,17 +90,15 @@ class Reduction:
     def __init__(self, iu: NDArray[np.int64], iw: NDArray[np.int64], n_rho: Array, n_eta: Array, size: int) -> None:
         both = (iu < size) & (iw < size)
         self.size = size
-        self.out = np.concatenate([np.where(both, iw, np.minimum(iu, iw))])  # the place that the normal displacement leaves empty
+        self.out = np.where(both, iw, np.minimum(iu, iw))  # the place that the normal displacement leaves empty
         self.iu, self.iw, self.n_rho, self.n_eta = iu[both], iw[both], n_rho[both], n_eta[both]
 
     def projected(self, v: Array) -> Array:
         """Rows of vectors, shape (..., n), without their normal parts at the held nodes."""
         v = v.copy()
-        normal = v[..., self.iu] * self.n_rho + v[..., self.iw] * self.n_eta
         along = -v[..., self.iu] * self.n_eta + v[..., self.iw] * self.n_rho
         v[..., self.out] = 0.0
         v[..., self.iu], v[..., self.iw] = -along * self.n_eta, along * self.n_rho
-        del normal
         return v
 
     def reduced(self, v: Array) -> Array:
@@ -176,7 +174,7 @@ class ContactEvaluation(Evaluation):
     reduction : Reduction
     """
 
-    __slots__ = ("held", "forces", "gaps", "reduction", "_raw")
+    __slots__ = ("_raw", "forces", "gaps", "held", "reduction")
 
     def __init__(self, raw: Evaluation, potential: ContactPotential, gaps: Gaps, held: Mask) -> None:
         space = potential.space
@@ -409,10 +407,13 @@ class ContactPotential(Potential):
         raw = super().evaluate(x, pressure, magnetic)
         gaps = self.gaps(raw.x)
         forces = self.with_poles(self.normal_forces(raw, gaps))
-        return ContactEvaluation(raw, self, gaps, gaps.close & (forces >= -self._round_off(raw, pressure)))
+        return ContactEvaluation(raw, self, gaps, gaps.close & (forces >= -self._round_off(raw, gaps, pressure)))
 
-    def _round_off(self, raw: Evaluation, pressure: float) -> float:
-        return NO_FORCE * max(raw.force_scale(pressure))
+    def _round_off(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Array:
+        """Normal forces at the nodes that are round-off: on a nearly flat membrane those along the axis are much smaller than others."""
+        u, w = raw.force_scale(pressure)
+        found: Array = NO_FORCE * (np.abs(gaps.n_rho) * u + np.abs(gaps.n_eta) * w)
+        return found
 
     def pressed(self, x: Array, pressure: float, magnetic: float) -> Mask:
         """Which nodes a solve from a state sets out to hold: those inside a body, and those that are pushed more than they are away."""
@@ -426,7 +427,7 @@ class ContactPotential(Potential):
         diagonal = np.append(np.abs(raw.band[2 * kd]), 0.0)
         stiffness = diagonal[iu] * gaps.n_rho**2 + diagonal[iw] * gaps.n_eta**2
         gap = np.where(gaps.close, 0.0, gaps.gap)
-        least = self._round_off(raw, pressure)
+        least = self._round_off(raw, gaps, pressure)
         found: Mask = np.where(gaps.close, forces >= -least, (forces > stiffness * gap) & ((gap < 0) | (forces > least)))
         return found & np.isfinite(forces)
 
@@ -443,7 +444,6 @@ class ContactPotential(Potential):
         return float(self.gaps(x).gap.min(initial=np.inf))
 
 
-
 class Held(ContactPotential):
     """The potential on a fixed set of held nodes, whose places are on the bodies: smooth, as any other.
 
@@ -458,7 +458,7 @@ class Held(ContactPotential):
         self.base, self.held = base, held
 
     @property
-    def unsettled(self) -> bool:
+    def unsettled(self) -> bool:  # type: ignore[override]
         return False
 
     def placed(self, x: Array) -> Array:

@@ -226,6 +226,8 @@ class Potential:
     unsettled = False
     #: a potential with the same expressions on other points
     _like: Potential | None = None
+    symbols: tuple[ca.SX, ca.SX, ca.SX]
+    terms: dict[str, ca.SX]
 
     @BUILDING
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:

@@ -146,10 +146,9 @@ def contact_of(evaluation: Any) -> Contact:
     potential = cast("ContactPotential", own.potential)
     space = potential.space
     pressures = np.zeros(space.degree * space.n_elements + 1)
-    u, u_x, w, w_x = space.displacement_at_quadrature(own.x)
-    rho = space.lifted[0] * 0 + space.R + u
-    area = space.weights * rho * np.hypot(space.R_x + u_x, space.Z_x + w_x)  # with the 2 pi
-    ends, n_rho, n_eta = {end for end, _ in potential.borders}, own.gaps.n_rho, own.gaps.n_eta
+    u, u_x, _, w_x = space.displacement_at_quadrature(own.x)
+    area = space.weights * (space.R + u) * np.hypot(space.R_x + u_x, space.Z_x + w_x)  # with the 2 pi
+    ends, n_eta = {end for end, _ in potential.borders}, own.gaps.n_eta
     parameters = space.node_parameters()
     place = {int(node): k for k, node in enumerate(potential.nodes)}
     zones = []
@@ -165,7 +164,7 @@ def contact_of(evaluation: Any) -> Contact:
         s = np.array([first_s, last_s])
         (R, _), displaced = space.mesh.position(s), space.displacement(own.x, s)[0]
         radii = np.where(np.isin([first, last], [0, parameters.size - 1]) & (np.abs(R) < 1e-12), 0.0, R + displaced)
-        followed = all(node % space.degree == 0 and (node // space.degree in ends or node in (0, parameters.size - 1)) for node in (first, last))
+        at_ends = {0, parameters.size - 1, *(end * space.degree for end in ends)}
         forces = own.forces[held]
         zones.append(
             ContactZone(
@@ -177,10 +176,9 @@ def contact_of(evaluation: Any) -> Contact:
                 -float((forces * n_eta[held]).sum()) + 0.0,
                 float(forces.sum()),
                 covered,
-                followed,
+                {first, last} <= at_ends,
             )
         )
-    del n_rho
     return Contact(tuple(zones), float(np.abs(own.gaps.gap).min()) if zones else float(own.gaps.gap.min()), own, pressures)
 
 

@@ -54,7 +54,7 @@ def check_obstacles(scene: Scene, lift: Lift | None) -> None:
             raise InputError(path, body.label(), allowed)
     for k, one in enumerate(scene.bodies):
         for j, other in enumerate(scene.bodies):
-            if j != k and _enters(one, other, size):
+            if j != k and one.bounded and _enters(one, other, size):
                 raise InputError(paths[k], one.label(), f"it overlaps the {other.label()}; obstacles apart from each other are allowed")
 
 
@@ -73,5 +73,7 @@ def _refuse_effects(scene: Scene) -> None:
         raise InputError("effects.tension_field", True, "false is allowed with an obstacle: wrinkles against a body are not computed")
     if scene.electric is not None and scene.electric.total_charge is not None:
         raise InputError("electric.total_charge", scene.electric.total_charge, "a voltage is allowed with an obstacle")
+    if scene.open:
+        raise InputError("mesh.accuracy", getattr(scene.mesh, "accuracy", None), "elements and degree are to be given with an obstacle")
     if scene.run is not None and getattr(scene.run, "number", None) is not None:
         raise InputError("run.over" if scene.run.over else "run.control", scene.run.number, f"not over a number beside an {key}")

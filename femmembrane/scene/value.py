@@ -25,8 +25,8 @@ from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import Source
 from ..physics.materials import Material
-from ..physics.obstacles import Obstacle
 from ..physics.named import material_data
+from ..physics.obstacles import Obstacle
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
 from .bodies import check_obstacles

@@ -292,7 +292,7 @@ def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
     evaluation = cast("ContactEvaluation", result.evaluation)
     potential, space = cast("ContactPotential", evaluation.potential), evaluation.potential.space
     density = evaluation.force_density.reshape(2, 4 * space.n_quadrature, space.n_elements)
-    scale = max(evaluation.force_scale(result.pressure))
+    scales = evaluation.force_scale(result.pressure)
     found = []
     for border in borders:
         element, local = (border.end, 0) if border.before else (border.end - 1, space.degree)
@@ -300,6 +300,7 @@ def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
         node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
         n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
         along, across = _at_end(potential, evaluation, result.pressure, border)
+        scale = abs(n_rho) * scales[0] + abs(n_eta) * scales[1]
         found.append(((forces[local] - along) * n_rho + (forces[space.degree + 1 + local] - across) * n_eta) / scale)
     return np.array(found)
 

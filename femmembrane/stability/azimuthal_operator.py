@@ -140,9 +140,7 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     )
 
 
-def _against_bodies(
-    potential: Potential, x: Array, pressure: float, layout: WaveUnknowns, band: Array
-) -> tuple[Array, Reduction | None]:
+def _against_bodies(potential: Potential, x: Array, pressure: float, layout: WaveUnknowns, band: Array) -> tuple[Array, Reduction | None]:
     """The matrix with what bodies add and take, and who takes vectors there; unchanged and None where none is touched.
 
     A body of which a node keeps the distance 0 leaves it the tangential displacement and the one around the axis. The force that it pushes

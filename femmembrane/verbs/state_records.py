@@ -96,7 +96,8 @@ def record(
     """
     bad = ill_posed(potential, state.evaluation)
     status = state.status if bad is None else bad.status
-    equilibrium = recorded(scene, potential, state.evaluation.x, state.pressure, state.evaluation, status, state.residual, state.iterations, gas)
+    own = state.evaluation
+    equilibrium = recorded(scene, potential, own.x, state.pressure, own, status, state.residual, state.iterations, gas)
     for analysis in asked(scene):
         analysis.compute(equilibrium, previous, state.evaluation)
     if clock is not None:  # written last, for answers take time

@@ -19,8 +19,8 @@ from ..results.special_point import SpecialPoint
 from ..scene import Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
-from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.active_set import contact_events
+from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import stopped_by_source, touches_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS
@@ -208,7 +208,8 @@ class TraceRun(Run[Branch]):
         self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
         steps = request.steps
         if self.potential.obstacles:  # a body next to the membrane at rest leaves it that much room
-            room = min(1.0, _ROOM * cast("ContactPotential", self.potential).touching(np.zeros(self.potential.space.n_free)) / self.potential.space.unit)
+            space, rest = self.potential.space, np.zeros(self.potential.space.n_free)
+            room = min(1.0, _ROOM * cast("ContactPotential", self.potential).touching(rest) / space.unit)
             steps = replace(steps, first=steps.first * room, smallest=steps.smallest * room)
         self.tracer = Tracer(Predictor(), steps.first, steps)
         self.special: list[SpecialPoint] | None = [] if request.special_points else None

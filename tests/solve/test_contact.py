@@ -152,7 +152,7 @@ def test_a_state_in_contact_is_one(name):
     assert contact.gap().min() >= -1e-9
     assert contact.pressure().min() >= 0
     before, after = (fm.equilibrium(scene, volume=1.5 + d, start=eq) for d in (-1e-4, 1e-4))
-    assert (after.energy - before.energy) / 2e-4 == pytest.approx(eq.pressure, rel=1e-6)
+    assert (after.energy - before.energy) / 2e-4 == pytest.approx(eq.pressure, rel=1e-5)
 
 
 def test_the_force_is_that_of_moving_the_body():
@@ -199,6 +199,65 @@ def test_without_a_body_nothing_is_built():
     assert potential_of(plate(elements=8)).operations == potential.operations
 
 
+def test_between_two_equilibria_of_a_branch():
+    """With a body every state between two others is solved for."""
+    branch = fm.inflate(plate(elements=24), volumes=[0.7, 0.95, 1.1, 1.3])
+    for volume in (0.8, 1.0, 1.2):
+        between = branch.at(volume=volume)
+        assert between.pressure == pytest.approx(fm.equilibrium(branch.scene, volume=volume).pressure, rel=1e-9)
+    assert len(branch.resample(9)) == 9
+
+
+@pytest.mark.parametrize(
+    ("key", "make"),
+    [
+        ("obstacle", lambda: plate(-0.1, elements=4).replace(obstacles=[fm.Plane(-0.1), fm.Plane(0.0)])),
+        ("obstacle", lambda: plate(0.0, elements=4)),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Ball(height=0.2, radius=0.3)])),
+        ("obstacle.radius", lambda: fm.Ball(height=1.0, radius=0.0)),
+        ("obstacle.length", lambda: fm.CylinderObstacle(height=1.0, radius=0.5, length=0.0)),
+        ("obstacle.rounding", lambda: fm.CylinderObstacle(height=1.0, radius=0.5, length=1.0, rounding=0.6)),
+        ("obstacle.points", lambda: fm.Mould([(0.0, 1.0), (0.0, 1.0)])),
+        ("obstacle.points", lambda: fm.Mould([(0.0, 1.0)])),
+        ("obstacle.side", lambda: fm.Plane(0.5, side="left")),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Plane(0.5), fm.Ball(height=0.7, radius=0.3)])),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=3)),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=[3])),
+        ("effects.tension_field", lambda: plate(elements=4, tension_field=True)),
+        ("mesh.accuracy", lambda: fm.Scene(material=NH, mesh=fm.disc(accuracy=1e-3), obstacles=[fm.Plane(0.5)])),
+        ("over", lambda: fm.vary(plate(elements=4), "material.alpha", [1.0], hold={"pressure": 0.0})),
+    ],
+)
+def test_bad_input(key, make):
+    with pytest.raises(fm.InputError) as error:
+        make()
+    assert error.value.key.startswith(key)
+
+
+def test_scene_files(tmp_path):
+    """Obstacles go to a file and back; a mould may have its points in a file of its own, and finds its side."""
+    (tmp_path / "bottle.txt").write_text("# rho z\n1.3, -0.2\n1.3; 0.4\n0.2 0.7\n0 0.7\n", encoding="utf-8")
+    text = """
+[material]
+model = "neo-hookean"
+[mesh]
+elements = 8
+[[obstacle]]
+kind = "mould"
+file = "bottle.txt"
+rounding = 0.1
+[[obstacle]]
+kind = "plane"
+height = -2.0
+side = "above"
+"""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    scene = fm.Scene.from_toml(tmp_path / "scene.toml")
+    assert scene.obstacles[0] == fm.Mould([(1.3, -0.2), (1.3, 0.4), (0.2, 0.7), (0.0, 0.7)], rounding=0.1, side="left")
+    scene.to_toml(tmp_path / "again.toml")
+    assert fm.Scene.from_toml(tmp_path / "again.toml") == scene
+
+
 # --- hard cases
 
 
@@ -213,8 +272,9 @@ def test_touch_at_the_pole_exactly():
 
 def test_contact_everywhere():
     """A sphere blown into a mould that is a sphere: every node is held, the border is none, and the pressure is what the stretch leaves."""
-    angle = np.linspace(0, np.pi, 721)
-    mould = fm.Mould([(1.2 * abs(np.sin(a)), 1.2 * np.cos(a)) for a in angle])
+    half, edges = np.pi / 16, np.arange(8)
+    corners = [(1.2 / np.cos(half) * np.sin(half + 2 * half * k), 1.2 / np.cos(half) * np.cos(half + 2 * half * k)) for k in edges]
+    mould = fm.Mould([(0.0, 1.2), *corners, (0.0, -1.2)], rounding=1.2)  # straight pieces without length: a round mould
     scene = fm.Scene(material=NH, mesh=fm.sphere(24), obstacles=[mould])
     eq = fm.equilibrium(scene, pressure=3.0)
     stretch = np.median(eq.profile()["stretch_1"])
@@ -249,13 +309,15 @@ def test_a_plate_next_to_a_membrane_at_rest():
 
 def test_contact_and_dipole_together():
     """A dipole behind the plate pulls the membrane against it; without a pressure the force is the dipole's alone."""
-    dipole = {"sources": [fm.Dipole(strength=60.0, height=2.0)], "susceptibility": 1.0}
-    free = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(48), **dipole), pressure=0.3)
-    eq = fm.equilibrium(plate(0.3, elements=48, **dipole), pressure=0.3)
+    dipole = {"sources": [fm.Dipole(strength=2.0, height=2.0)], "susceptibility": 1.0}
+    free = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(32), **dipole), pressure=0.3)
+    eq = fm.equilibrium(plate(0.25, elements=32, **dipole), pressure=0.3)
     assert free.center_height > 0.3
-    assert eq.contact.touching
-    assert eq.center_height == pytest.approx(0.3, abs=1e-12)
-    assert eq.contact.pressure([0.0])[0] > 0.3  # the field presses as well
+    assert eq.center_height == pytest.approx(0.25, abs=1e-12)
+    stretch = eq.profile([0.0])["stretch_1"][0]
+    # at the pole of a flat membrane the field alone presses beside P: -d/dz (-chi/2 |h|^2) with |h|^2 = 4 M/(z - h)^6, over stretch^2
+    field = 12 * 2.0 / (2.0 - 0.25) ** 7 / stretch**2
+    assert eq.contact.pressure([0.0])[0] == pytest.approx(0.3 + field, rel=1e-3)
 
 
 @pytest.mark.parametrize("elements", [10, pytest.param(10_000, marks=pytest.mark.slow), 300])
@@ -266,7 +328,7 @@ def test_few_and_many_elements(elements):
 
 def test_a_membrane_deflated_away_from_a_plate_does_not_feel_it():
     bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(16)), volume=-1.0)
-    assert fm.equilibrium(plate(elements=16), volume=-1.0).pressure == pytest.approx(bare.pressure, rel=1e-12)
+    assert fm.equilibrium(plate(elements=16), volume=-1.0).pressure == pytest.approx(bare.pressure, rel=1e-9)
 
 
 def test_between_two_plates():

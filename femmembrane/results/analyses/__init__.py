@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, unknown_name
 from ...quantities import Quantity, heading, quantity, typed
-from .contact import ContactWithBodies
 from .base import EquilibriumAnalysis, PrintedColumn, Remark
+from .contact import ContactWithBodies
 from .error_estimates import ErrorEstimates
 from .si_columns import SIColumns
 from .verdicts import Verdicts

@@ -44,16 +44,13 @@ class ContactWithBodies(EquilibriumAnalysis):
             yield Remark("contact", text, terminal=f"contact to {contact.radius:.4g}", caption=f"contact to {contact.radius:.4g}")
 
     def section(self, branch: Branch) -> Section:
-        labels = [body.label() for body in branch.scene.bodies]
-        rows = [
-            [
-                label,
-                sum(any(zone.body == k for zone in eq.contact.zones) for eq in branch if eq.contact is not None),
-                f"{max((zone.normal_force for eq in branch if eq.contact is not None for zone in eq.contact.zones if zone.body == k), default=0.0):.6g}",
-            ]
-            for k, label in enumerate(labels)
-        ]
-        curves = {"deformed": np.nan_to_num(branch.column("contact_radius")), "reference": np.nan_to_num(branch.column("contact_reference_radius"))}
+        found = [eq.contact.zones for eq in branch if eq.contact is not None]
+        rows = []
+        for k, body in enumerate(branch.scene.bodies):
+            forces = [sum(zone.normal_force for zone in zones if zone.body == k) for zones in found if any(z.body == k for z in zones)]
+            rows.append([body.label(), len(forces), f"{max(forces, default=0.0):.6g}"])
+        names = {"deformed": "contact_radius", "reference": "contact_reference_radius"}
+        curves = {label: np.nan_to_num(branch.column(name)) for label, name in names.items()}
         figure = Curves("Radius of contact along the branch", "radius of contact", curves)
         table = Table(["body", "equilibria in contact", "largest force"], rows, "Bodies in the way of the membrane")
         return Section("Contact", figure, table, list(self.remarks(branch[-1])))

@@ -68,6 +68,7 @@ from .results.equilibria import Equilibria as Equilibria
 from .results.equilibrium import Equilibrium as Equilibrium
 from .results.error_estimate import Deviation as Deviation
 from .results.error_estimate import ErrorEstimate as ErrorEstimate
+from .results.error_estimate import PlaceEstimate as PlaceEstimate
 from .results.folds import Cusp as Cusp
 from .results.folds import FoldCurve as FoldCurve
 from .results.special_point import Jump as Jump

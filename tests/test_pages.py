@@ -70,7 +70,15 @@ def test_scene_files_are_described(kind, name):
     """Every registered name has a row, which names the arguments that are its own."""
     text = text_of(PACKAGE / "scene" / "README.md")
     rows = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]  # a shape and an obstacle may share a name
-    shared = {"strength", "orientation", "elements", "ratio", "estimated"}  # said above the tables, or written by the package alone
+    shared = {
+        "strength",
+        "orientation",
+        "elements",
+        "ratio",
+        "ends",
+        "accuracy",
+        "estimated",
+    }  # said above the tables, or written by the package alone
     own = [f.name for f in dataclasses.fields(registry(REGISTRIES[kind])[name]) if f.name not in shared]
     assert any(all(f"`{argument}" in row for argument in own) for row in rows)
 

@@ -54,7 +54,7 @@ def run(
     from ..scene.absurd_loads import remarks_on_loads
 
     system = units_of(scene, changes, units)
-    Units.of(system, asked.scales)
+    Units.of(system, asked.converter)
     for remark in remarks_on_loads(asked):
         fail(DONE, remark)
 

@@ -5,12 +5,16 @@
 - :mod:`.replay`: the instructions of such a function, on whole vectors of points
 - :mod:`.potential`: values and derivatives at a state
 - :mod:`.family`: the potential of scenes that differ in one number
+- :mod:`.numbered`: the potential of scenes that differ in several numbers
 - :mod:`.strain_energy`: strain energies of one's own
 """
 
 from ..kernels.interface import Array as Array
 from .family import Family as Family
 from .family import FoldDerivatives as FoldDerivatives
+from .numbered import NumberDerivatives as NumberDerivatives
+from .numbered import Numbered as Numbered
+from .numbered import NumberedMember as NumberedMember
 from .potential import Evaluation as Evaluation
 from .potential import Potential as Potential
 from .potential import potential_of as potential_of

@@ -256,11 +256,10 @@ class ContactEvaluation(Evaluation):
 class ContactPotential(Potential):
     """The potential of a scene with obstacles. Which nodes are held in a state follows from the state itself."""
 
-    def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
-        self._root: ContactPotential | None = None
+    def __init__(self, scene: Scene, quadrature: int | None = None, root: ContactPotential | None = None) -> None:
+        self._root = root
         if scene.borders:
-            self._root = cast(ContactPotential, potential_of(scene.bordered(())))
-            self._like = self._root
+            self._root = self._like = root or cast(ContactPotential, potential_of(scene.bordered(())))
         super().__init__(scene, quadrature)
         self.obstacles = scene.bodies
         self._moved: dict[Borders, ContactPotential] = {}
@@ -293,7 +292,7 @@ class ContactPotential(Potential):
             return root
         known = root._moved.pop(borders, None)
         if known is None:
-            known = ContactPotential(root.scene.bordered(borders))
+            known = ContactPotential(root.scene.bordered(borders), root=root)
         root._moved[borders] = known
         if len(root._moved) > _KEPT:
             root._moved.pop(next(iter(root._moved)), None)
@@ -456,6 +455,7 @@ class Held(ContactPotential):
     def __init__(self, base: ContactPotential, held: Mask) -> None:
         self.__dict__.update(base.__dict__, _root=base.root)
         self.base, self.held = base, held
+        self._looked_at: tuple[Array, Gaps] | None = None
 
     @property
     def unsettled(self) -> bool:  # type: ignore[override]
@@ -470,6 +470,7 @@ class Held(ContactPotential):
             gaps = self.gaps(x)
             moved = self.held & ~gaps.close
             if not moved.any():
+                self._looked_at = x, gaps
                 break
             for index, normal in ((iu, gaps.n_rho), (iw, gaps.n_eta)):
                 own = moved & (index < n)
@@ -477,8 +478,8 @@ class Held(ContactPotential):
         return x
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
-        raw = Potential.evaluate(self, x, pressure, magnetic)
-        return ContactEvaluation(raw, self, self.gaps(raw.x), self.held)
+        raw, known = Potential.evaluate(self, x, pressure, magnetic), self._looked_at
+        return ContactEvaluation(raw, self, known[1] if known is not None and known[0] is raw.x else self.gaps(raw.x), self.held)
 
 
 def gap_rows(potential: ContactPotential, y: ca.MX, p: ca.MX) -> ca.MX:

@@ -191,6 +191,12 @@ class Evaluation:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
         return self.elements.force_scale(self._densities, pressure)
 
+    def form_parts(self, mode: Array) -> tuple[float, float]:
+        """Of the integrand of mode . (E'' - P V'') mode, less what the :attr:`spring` adds: see :meth:`.Elements.form_parts`. The weights
+        are those of the highest polynomial that the quadrature points of an element tell apart.
+        """
+        return self.elements.form_parts(self._densities, np.ascontiguousarray(mode), self.potential.space.highest)
+
     @property
     def load_energy(self) -> float:
         """Energy of the loads at x: computed only when asked for, as no solver needs it."""
@@ -364,6 +370,17 @@ class Potential:
         return float(self.bulk.sum())
 
     @cached_property
+    def arc_band(self) -> Array:
+        """The inner product of (x, P), which is the same on every mesh: mean over the reference area of the displacements plus P Q, both in
+        units of the membrane's own size. In band storage, shape (3 kd + 1, n_free + 1).
+        """
+        square = self.space.unit**2
+        band = np.zeros((self.space.n_free + 1, len(self.mass)))
+        band[:-1] = self.mass.T / (self.area * square)
+        band[-1, 2 * self.space.half_bandwidth] = square
+        return band.T
+
+    @cached_property
     def rigid(self) -> Array | None:
         """Where the membrane can move along the axis as a whole: the mass times that motion, of mass one, shape (n_free, 1)."""
         space = self.space
@@ -458,15 +475,12 @@ class Potential:
         names = ("voltage", "charge", "capacitance", "electric_field")
         if self.electric is None:
             return dict.fromkeys(names, 0.0)
-        space, sheet = self.space, self.sheet
-        thickness = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[0]
-        square = self._field_squared(x)
-        largest = float(np.sqrt(square.max()))
+        space, largest = self.space, self.largest_field(x)
         if self.electric.frozen_charge is not None:
             covered = float((space.area_weights * self.electric.covers(space.s)).sum())
             return dict(zip(names, (np.nan, self.electric.frozen_charge * covered, np.nan, largest), strict=True))
         phi = math.sqrt(self.square(x) or 0.0)
-        capacitance = float((space.area_weights * thickness * square).sum()) / phi**2
+        capacitance = 2 * abs(self.electric_energy(x)) / phi**2
         return dict(zip(names, (phi, phi * capacitance, capacitance, largest), strict=True))
 
     @cached_property
@@ -609,11 +623,17 @@ def potential_of(scene: Scene) -> Potential:
         While the mesh of the scene is still to be chosen.
     """
     require_elements(scene)
+    return _potential_of(_plain(scene))
+
+
+@lru_cache(maxsize=256)
+def _plain(scene: Scene) -> Scene:
+    """The scene without what makes no difference to its potential."""
     electric = scene.electricity
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
     plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain))
+    return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
 
 
 def require_elements(scene: Scene) -> None:

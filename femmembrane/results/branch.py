@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..discretization.meridian import in_words
 from ..errors import Status, printable
 from ..quantities import PLACES, words, written
 from . import door
@@ -228,6 +229,52 @@ class Branch(Sequence[Equilibrium]):
 
         return resampled(self, count, refine)
 
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = "pressure",
+        to: str | Sequence[str] = (),
+        *,
+        held: str | None = None,
+        r: ArrayLike | None = None,
+        control: str | None = None,
+        azimuthal: int = 0,
+    ) -> Any:
+        """Derivatives along the branch with respect to numbers of the scene, or those of its first limit point.
+
+        Parameters
+        ----------
+        of : str or list of str
+            As for :meth:`.Equilibrium.sensitivity`; or ``limit_pressure``, ``limit_volume``, ``limit_height`` of the first limit point.
+            Any other one is asked of itself: ``branch.special_points[1].sensitivity(...)``.
+        to, held, r, control, azimuthal
+            As for :meth:`.Equilibrium.sensitivity`. At a limit point nothing is held.
+
+        Returns
+        -------
+        ndarray or dict
+            A row for each equilibrium, and one number for a limit point; in dicts by names where lists were given.
+
+        Raises
+        ------
+        InputError
+            As :meth:`.Equilibrium.sensitivity`, and for a branch without a limit point.
+        SolveError
+            As there.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> scene = fm.Scene(material=fm.MooneyRivlin(0.05), mesh=fm.disc(16))
+        >>> branch = fm.trace(scene, until={"volume": 8.0})
+        >>> print(f"{branch.sensitivity('limit_pressure', 'material.ratio'):.4f}")
+        7.5381
+        >>> len(branch.sensitivity("pressure", "material.ratio", held="center_height")) == len(branch)
+        True
+        """
+        from .sensitivities import Along, sensitivity_along
+
+        return sensitivity_along(self, of, to, held, Along(r, control, azimuthal))
+
     def column(self, name: str) -> NDArray[Any]:
         """One column of the table.
 
@@ -268,7 +315,8 @@ class Branch(Sequence[Equilibrium]):
         accuracy, estimated = (getattr(mesh, name, None) for name in ("accuracy", "estimated"))
         if accuracy is None or estimated is None:
             return ""
-        return f"mesh: {mesh.elements} elements of degree {degree}, graded, chosen for accuracy {accuracy:g}, estimated {estimated:.0e}"
+        chosen = f"chosen for accuracy {in_words(accuracy)}, estimated {estimated:.0e}"
+        return f"mesh: {mesh.elements} elements of degree {degree}, graded, {chosen}"
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ Records stand below these rooms. They go up here alone, when one of their method
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,14 +14,16 @@ if TYPE_CHECKING:
     from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
     from ..solve.controls import Gas
+    from ..solve.sensitivity import Rates, Sensitive
     from ..stability.profile import Profile
     from .branch import Branch
     from .convergence import Convergence
     from .cost import Cost
     from .equilibria import Equilibria
     from .equilibrium import Equilibrium
-    from .error_estimate import ErrorEstimate
+    from .error_estimate import ErrorEstimate, PlaceEstimate
     from .folds import FoldCurve
+    from .special_point import SpecialPoint
     from .sweep import Sweep
     from .verdict import Verdict
     from .vibration import Vibration
@@ -87,6 +89,29 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     from ..accuracy.error_estimate import estimate_errors
 
     return estimate_errors(potential, x, pressure, control, verdicts)
+
+
+def estimate_place(point: SpecialPoint) -> PlaceEstimate:
+    """See :func:`femmembrane.accuracy.place_estimate.estimate_place`."""
+    from ..accuracy.place_estimate import estimate_place
+
+    eq = point.equilibrium
+    return estimate_place(eq.potential, eq.state, eq.pressure, point.kind, point.azimuthal)
+
+
+def eigenvalue_rates(
+    eq: Equilibrium,
+    known: Sensitive,
+    rates: Rates,
+    control: str | None,
+    azimuthal: int,
+    moved: Callable[[int, float], tuple[Scene, Array, float]],
+    step: Callable[[int], float],
+) -> Array:
+    """See :func:`femmembrane.stability.eigenvalue_rates.eigenvalue_rates`."""
+    from ..stability.eigenvalue_rates import eigenvalue_rates
+
+    return eigenvalue_rates(eq, known, rates, control, azimuthal, moved, step)
 
 
 # --- pictures and pages

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -124,8 +124,9 @@ class Equilibrium:
     @property
     def breakdown_ratio(self) -> float:
         """Largest true field over the breakdown field; NaN where the scene gives none."""
-        electricity = self.scene.electricity
-        return np.nan if electricity is None or electricity.breakdown is None else self.electric_field / electricity.breakdown
+        own = self.scene.electric  # where its number is 0, the field is
+        breakdown = None if own is None else own.plain(self.scene.scales).breakdown
+        return np.nan if breakdown is None else self.electric_field / breakdown
 
     @property
     def _electric(self) -> dict[str, float]:
@@ -229,12 +230,24 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        space = self.potential.space if not self.scene.borders or r is not None else self.in_scene(self.scene.bordered(())).potential.space
-        s = space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
-        columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.scales)
+        s = self.places(r)
+        columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.converter)
         if (contact := self.contact) is not None:
             columns |= {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
         return columns
+
+    def places(self, r: ArrayLike | None = None) -> Array:
+        """Parameters of the meridian at reference radii, see :meth:`profile`.
+
+        Parameters
+        ----------
+        r : array_like, optional
+            Default: the nodes.
+        """
+        space = self.potential.space
+        if r is None:
+            space = self.potential.root.space
+        return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
     def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
@@ -268,7 +281,9 @@ class Equilibrium:
         key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
         if control == "gas" and gas is None:
             gas = self.enclosed
-        potential = self.potential if electric is None else self._holding(electric)
+        if electric is None:
+            return self.remembered(key, lambda: self._judged(self.potential, control, azimuthal, gas))
+        potential = self._holding(electric)
         key = key if potential is self.potential else (*key, electric)
         return self.remembered(key, lambda: self._judged(potential, control, azimuthal, gas))
 
@@ -365,6 +380,72 @@ class Equilibrium:
             return door.estimate_errors(self.potential, self.state, self.pressure, held, verdicts)
 
         return self.remembered(("errors", held), estimate)
+
+    @one_thread
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = "pressure",
+        to: str | Sequence[str] = (),
+        *,
+        held: str | None = None,
+        r: ArrayLike | None = None,
+        control: str | None = None,
+        azimuthal: int = 0,
+    ) -> Any:
+        """Derivatives of what the equilibrium answers with respect to numbers of its scene, while a quantity is held.
+
+        They are exact on the mesh, beyond limit points as well: one back-substitution a number with the factors of the equilibrium.
+        Profiles, electric quantities and eigenvalues against waves around the axis are good to about nine digits.
+
+        Parameters
+        ----------
+        of : str or list of str
+            ``pressure``, ``volume``, ``center_height``, ``gas_amount``; ``energy``, ``elastic_energy``, ``magnetic_energy``,
+            ``load_energy``, ``electric_energy``; ``voltage``, ``charge``, ``capacitance``, ``electric_field``; ``eigenvalue``, the smallest
+            one; columns of :meth:`profile`: ``rho``, ``eta``, ``stretch_1``, ``total_stress_2``, ... Of a scene with scales those with
+            ``_pa``, ``_m``, ... as well, while the scales stay.
+        to : str or list of str
+            Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
+            Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
+            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: SI numbers stay, a held pressure included.
+        held : {"pressure", "volume", "center_height", "gas"}, optional
+            Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
+        r : array_like, optional
+            Where profiles are wanted, as for :meth:`profile`. Default: the nodes.
+        control, azimuthal : as for :meth:`verdict`
+            Which eigenvalue.
+
+        Returns
+        -------
+        float, ndarray or dict
+            For one quantity and one number its derivative, an array for a profile. A list of numbers gives a dict by their names, a list of
+            quantities one by theirs with such values in it.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
+        SolveError
+            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+
+        Notes
+        -----
+        In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
+        border of the wrinkles passes a quadrature point.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> eq = fm.equilibrium(fm.Scene(material=fm.MooneyRivlin(0.1), mesh=fm.disc(16)), center_height=1.0)
+        >>> print(f"{eq.sensitivity('pressure', 'material.ratio', held='center_height'):.4f}")
+        2.1351
+        >>> both = eq.sensitivity(["pressure", "volume"], ["material.ratio", "membrane.prestretch"], held="center_height")
+        >>> print(f"{both['volume']['membrane.prestretch']:.4f}")
+        2.9464
+        """
+        from .sensitivities import Along, sensitivity_of
+
+        return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
         """Numbers and verdicts with the deformed meridian, for notebooks."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from . import door
 from .equilibrium import Equilibrium
+from .error_estimate import PlaceEstimate
 
 Array = NDArray[np.float64]
 
@@ -49,6 +53,62 @@ class SpecialPoint:
     def number(self) -> float | None:
         """Value of the number of the scene over which the branch was traced; None for a branch of one scene."""
         return self.equilibrium.number(self.over) if self.over else None
+
+    def error_estimate(self) -> PlaceEstimate:
+        """By how much the mesh moves this point, from locating it again in a finer space.
+
+        Limit points, folds and azimuthal onsets have an estimate; others say why they have none.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(6), degree=2)
+        >>> point = fm.trace(scene, start=0.5, until={"center_height": 3.0}).special_points[0]
+        >>> estimate = point.error_estimate()
+        >>> print(f"P = {point.pressure:.6f}, off by {estimate.pressure.error:.0e}")
+        P = 1.879247, off by 7e-05
+        """
+        return door.estimate_place(self)
+
+    def sensitivity(
+        self,
+        of: str | Sequence[str] = "pressure",
+        to: str | Sequence[str] = (),
+        *,
+        r: ArrayLike | None = None,
+        control: str | None = None,
+        azimuthal: int = 0,
+    ) -> Any:
+        """How the place of a limit point or of a volume fold moves with numbers of the scene; exact on the mesh.
+
+        Parameters
+        ----------
+        of, to, r, control, azimuthal
+            As for :meth:`.Equilibrium.sensitivity`; nothing is held, as the point remains a fold.
+
+        Returns
+        -------
+        float, ndarray or dict
+            As for :meth:`.Equilibrium.sensitivity`.
+
+        Raises
+        ------
+        InputError
+            For a point of another kind, an unknown quantity or number, and with a total charge.
+        SolveError
+            Where two folds meet.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> branch = fm.trace(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), until={"center_height": 2.0})
+        >>> limit = branch.special_points[0]
+        >>> print(f"P = {limit.pressure:.4f}, dP/dp = {limit.sensitivity('pressure', 'membrane.prestretch'):.4f}")
+        P = 1.8792, dP/dp = -1.3409
+        """
+        from .sensitivities import Along, sensitivity_of_point
+
+        return sensitivity_of_point(self, of, to, Along(r, control, azimuthal))
 
     def __repr__(self) -> str:
         over = {self.over: self.number} if self.over else {}

@@ -33,8 +33,8 @@ def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
     Behind the step stands the number of the scene that changes along the branch, if one does. Between those that every branch has stand
-    ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, those of :func:`electric_columns`, and the columns of
-    the analyses that the scene asks for.
+    ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, ``electric_energy`` when it has
+    electrodes, and the columns of the analyses that the scene asks for.
     """
     scene = branch.scene
     return [
@@ -43,20 +43,11 @@ def columns(branch: Branch) -> list[str]:
         *("volume", "pressure", "center_height", "elastic_energy"),
         *(["magnetic_energy"] if scene.sources else []),
         *(["load_energy"] if scene.loads else []),
-        *electric_columns(scene),
+        *(["electric_energy"] if scene.electric else []),
         *(["gas"] if scene.chamber else []),
         *(name for analysis in asked(scene) for name in analysis.columns(scene)),
         *_LAST,
     ]
-
-
-def electric_columns(scene: Scene) -> list[str]:
-    """What a scene with voltage or charge has besides; the ratio to the breakdown field where it is given."""
-    electric = scene.electric
-    if electric is None:
-        return []
-    one = [] if electric.frozen_charge is not None else ["voltage", "capacitance"]
-    return ["electric_energy", *one, "charge", "electric_field", *([] if electric.breakdown is None else ["breakdown_ratio"])]
 
 
 def reader(scene: Scene, column: str) -> Callable[[int, Equilibrium], Cell]:

@@ -100,7 +100,7 @@ SHAPES: dict[str, Any] = {
     "curve": Curve,
 }
 #: keys of [mesh] beside the file that holds the meridian
-FILE_KEYS = ("group", "divisions", "first", "last")
+FILE_KEYS = ("group", "divisions", "first", "last", "accuracy")
 SCENE_KEYS: dict[str, tuple[str, ...]] = {
     "membrane": (
         *("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from .magnetisation import checked_magnetisation, refuse_magnetisation
 from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 from .variation import names
+
+if TYPE_CHECKING:
+    from ..quantities import Converter
 
 MAX_DEGREE = 8
 #: largest pre-stretch: its sixth power is still a number beside 1
@@ -243,8 +246,11 @@ class Scene:
             self.electric.plain(self.scales)  # refuses units without scales
             ends = self.mesh.breakpoints()
             self.electric.check(float(ends[0]), float(ends[-1]))
-            if hasattr(self.material, "volume_ratio"):
-                allowed = "an incompressible material is allowed with a voltage or a charge, whose field follows from a constant volume"
+            if hasattr(self.material, "volume_ratio") and not hasattr(self.material, "electrified"):
+                allowed = (
+                    "a compressible material is allowed with a voltage or a charge if it says how the field changes its thickness, in a "
+                    "method `electrified` as that of Hooke; an incompressible one needs none"
+                )
                 raise InputError("material.kind", type(self.material).__name__, allowed)
 
     def _check_sources(self, lift: Lift | None) -> None:
@@ -307,6 +313,14 @@ class Scene:
         if self.electric is not None:  # with a number of 0 too: it may be one of a family
             places |= {*self.electric.ends} - {*self.mesh.breakpoints()[[0, -1]]}
         return tuple(sorted(places))
+
+    @property
+    def converter(self) -> Converter | None:
+        """What turns its numbers into SI units: its scales, with the permittivity of its electrodes; None without scales."""
+        if self.electric is None:
+            return self.scales
+        found: Converter | None = self.electric.converter(self.scales)
+        return found
 
     @property
     def electricity(self) -> Electric | None:

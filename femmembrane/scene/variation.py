@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from types import SimpleNamespace
@@ -43,6 +43,26 @@ if TYPE_CHECKING:
 _TINY = 1e-300
 #: how a sheet is magnetised beside its susceptibility
 MAGNETISATION = ("demagnetization", "saturation", "remanence", "remanence_direction", "remanence_transport")
+#: scales that may change while all that was given in SI units stays
+SCALES = ("scales.thickness", "scales.shear_modulus")
+#: powers of both in the units of numbers by their last names, and of quantities by their kinds (:class:`~femmembrane.Scales`); strengths
+#: are squares of what is measured
+_POWERS: Mapping[str, tuple[float, float]] = {
+    "strength": (0.0, 1.0),
+    "weight": (0.0, 1.0),
+    "gamma": (1.0, 1.0),
+    "force": (1.0, 1.0),
+    "atmosphere": (1.0, 1.0),
+    "voltage": (1.0, 0.5),
+    "total_charge": (0.0, 0.5),
+    "frozen_charge": (0.0, 0.5),
+    "saturation": (0.0, 0.5),
+    "remanence": (0.0, 0.5),
+    "pressure": (1.0, 1.0),
+    "energy": (1.0, 1.0),
+    "gas": (1.0, 1.0),
+    "stress": (0.0, 1.0),
+}
 #: parts of a scene that are lists, by their names
 _LISTS = {"source": "sources", "load": "loads"}
 #: parts of a scene that are objects of their own
@@ -74,6 +94,11 @@ class Parameter:
             raise unknown_name("parameter", self.name, known or ["(this scene has no number to vary)"])
         if self.name.startswith("material.mu.") and len(self.scene.material.mu) == 1:  # type: ignore[attr-defined]
             raise InputError("parameter", self.name, "the only modulus is 2/alpha, fixed by the unit of stress; vary material.alpha.0")
+
+    @property
+    def even(self) -> bool:
+        """Whether its square alone acts, as that of a voltage or a charge."""
+        return self.name.startswith("electric.")
 
     @property
     def value(self) -> float:
@@ -127,45 +152,70 @@ class Parameter:
 
     def vary(self, value: Any) -> Any:
         """The parts of the scene at a value that may be a symbol. They are not checked, and formulas alone may use them."""
-        scene, (part, _, rest) = self.scene, self.name.partition(".")
-        material: Any = scene.material
-        sources: tuple[Any, ...] = scene.sources
-        loads: tuple[Any, ...] = scene.loads
-        susceptibility, electricity = scene.susceptibility, scene.electricity
-        magnetisation = {name: getattr(scene, name) for name in MAGNETISATION}
-        moved: dict[str, Any] = {}
-        if part == "chamber":  # of the control, and of no potential
-            pass
-        elif part == "electric":
-            given: Any = scene.electric
-            unit = 1.0 if given.relative_permittivity is None else given.units(scene.scales)[rest]
-            electricity = _unchecked(dataclasses.replace(given, **{rest: 1.0}).plain(scene.scales), **{rest: value / unit})
-        elif rest == "prestretch":  # the lift of p is p - 1 times that of 2
-            moved = {"prestretch": 2.0, "lifted": Moving.between(value - 1, 2.0, None, _lift(scene.mesh, 2.0), 1.0)}
-        elif part == "mesh":
-            moved = self._moved(value)
-        elif part == "membrane" and rest in magnetisation:
-            magnetisation[rest] = value
-        elif part == "membrane" and Magnetisation.of(scene) is not None:
-            susceptibility = value
-        elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
-            sources, susceptibility = tuple(_Scaled(s, value) for s in sources), 1.0
-        elif rest.startswith("alpha."):
-            material = _with_exponent(material, int(rest[6:]), value)
+        parts, (part, _, rest) = _parts(self.scene), self.name.partition(".")
+        if rest.startswith("alpha."):
+            parts.material = _with_exponent(parts.material, int(rest[6:]), value)
         elif part == "material":
-            material = _unchecked(material, **self._material_numbers(rest, value))
-        elif part == "load":
-            index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
-            loads = (*loads[:index], _unchecked(loads[index], **{name: value}), *loads[index + 1 :])
+            parts.material = _unchecked(parts.material, **self._material_numbers(rest, value))
+        else:
+            self._put(parts, value)
+        return parts
+
+    def _put(self, parts: SimpleNamespace, value: Any) -> None:
+        """Change parts of the scene to those at a value; of a number that is not one of the material."""
+        scene, (part, _, rest) = self.scene, self.name.partition(".")
+        if part == "chamber":  # of the control, and of no potential
+            return
+        if part == "electric":
+            given: Any = scene.electric
+            parts.electricity = _unchecked(dataclasses.replace(given, **{rest: 1.0}).plain(scene.scales), **{rest: value / self.unit})
+        elif rest == "prestretch":  # the lift of p is p - 1 times that of 2
+            parts.prestretch, parts.lifted = 2.0, Moving.between(value - 1, 2.0, None, _lift(scene.mesh, 2.0), 1.0)
+        elif part == "mesh":
+            vars(parts).update(self._moved(value))
+        elif part == "membrane" and rest in MAGNETISATION:
+            setattr(parts, rest, value)
+        elif part == "membrane" and Magnetisation.of(scene) is not None:
+            parts.susceptibility = value
+        elif part == "membrane":  # chi |h|^2 = |sqrt(chi) h|^2
+            parts.sources, parts.susceptibility = tuple(_Scaled(s, value) for s in parts.sources), 1.0
         else:
             index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
-            changed = [
-                _Scaled(_unchecked(s, strength=1.0), value) if name == "strength" else _unchecked(s, **{name: value}) for s in sources
-            ]
-            sources = (*sources[:index], changed[index], *sources[index + 1 :])
-        parts = {"material": material, "sources": sources, "loads": loads, "susceptibility": susceptibility, "electricity": electricity}
-        kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends")
-        return SimpleNamespace(**parts, **magnetisation, **{**{name: getattr(scene, name) for name in kept}, **moved})
+            owners = getattr(parts, _LISTS[part])
+            if name == "strength":
+                changed: Any = _Scaled(_unchecked(owners[index], strength=1.0), value)
+            else:
+                changed = _unchecked(owners[index], **{name: value})
+            setattr(parts, _LISTS[part], (*owners[:index], changed, *owners[index + 1 :]))
+
+    @property
+    def unit(self) -> float:
+        """What a voltage or a charge is divided by in formulas; 1 for any other number."""
+        given: Any = self.scene.electric
+        if not self.name.startswith("electric.") or given.relative_permittivity is None:
+            return 1.0
+        return float(given.units(self.scene.scales)[self.name.partition(".")[2]])
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves an end of the membrane."""
+        return self.name.startswith("mesh.") or self.name == "membrane.prestretch"
+
+    def rates(self) -> dict[str, float]:
+        """How numbers of the scene change with this one, by their names: by 1 for each unit, and those of a material that go with it."""
+        part, _, rest = self.name.partition(".")
+        if part != "material":
+            return {self.name: 1.0}
+        name, _, index = rest.partition(".")
+        material: Any = self.scene.material
+        if not index:  # what goes with a number is linear in it
+            ahead, here = (self._material_numbers(name, self.value + step) for step in (1.0, 0.0))
+            return {f"material.{key}": ahead[key] - here[key] for key in ahead}
+        k, mu, alpha = int(index), material.mu, material.alpha
+        if name == "alpha":
+            return {self.name: 1.0, f"material.mu.{k}": -mu[k] / alpha[k]}
+        others = sum(m * a for j, (m, a) in enumerate(zip(mu, alpha, strict=True)) if j != k)
+        return {f"material.mu.{j}": 1.0 if j == k else -m * alpha[k] / others for j, m in enumerate(mu)}
 
     def _mesh_at(self, value: float | None) -> Meridian:
         """The mesh with this place of the end; None is where the end rests."""
@@ -210,6 +260,129 @@ class Parameter:
         return {"mu": tuple(mu), "alpha": tuple(alpha)}
 
 
+@dataclass(frozen=True)
+class Scale:
+    """A scale of a scene in SI units, by which everything that was given in SI units becomes another number.
+
+    Lengths, ratios and the numbers of a material stay. What is held, as a pressure in Pa is, becomes another number too.
+
+    Parameters
+    ----------
+    scene : Scene
+        With scales.
+    name : {"scales.thickness", "scales.shear_modulus"}
+
+    Raises
+    ------
+    InputError
+        For another name, a scene without scales, and sources and loads of one's own, which nobody can convert.
+    """
+
+    scene: Scene
+    name: str
+
+    def __post_init__(self) -> None:
+        known = [*names(self.scene), *(SCALES if self.scene.scales is not None else ())]
+        if self.name not in known or self.name not in SCALES:
+            raise unknown_name("parameter", self.name, known)
+        numbers = set(names(self.scene))
+        for k, source in enumerate(self.scene.sources):
+            if f"source.{k}.strength" not in numbers:
+                raise InputError("parameter", self.name, f"sources with a strength are allowed, which is converted; not {source!r}")
+        for load in self.scene.loads:
+            if not all(name in _POWERS for name in _numbers(load)):
+                raise InputError("parameter", self.name, f"loads of the package are allowed, whose numbers are converted; not {load!r}")
+
+    @property
+    def value(self) -> float:
+        """The scale in SI units."""
+        return float(getattr(self.scene.scales, self.name.partition(".")[2]))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves an end of the membrane."""
+        return False
+
+    def power(self, name: str) -> float:
+        """Power of the scale in the unit of a number of the scene, or of a quantity by its kind."""
+        known = _POWERS.get(name) or (_POWERS.get(name.rpartition(".")[2]) if "." in name else None) or (0.0, 0.0)
+        return known[SCALES.index(self.name)]
+
+    def rates(self) -> dict[str, float]:
+        """How numbers of the scene change with the scale, by their names."""
+        found = ((name, self.power(name) * _named(self.scene, name).value) for name in names(self.scene))
+        return {name: -product / self.value for name, product in found if product}
+
+    def scene_at(self, value: float) -> Scene:
+        """The scene with this scale and the same SI numbers, checked like every scene.
+
+        Raises
+        ------
+        InputError
+            For a scale that is not positive.
+        """
+        old: Any = self.scene.scales
+        scales = dataclasses.replace(old, **{self.name.partition(".")[2]: value})
+        scene, electric = self.scene, self.scene.electric
+        for name in self.rates():
+            if not (name.startswith("electric.") and getattr(electric, "relative_permittivity", None) is not None):
+                parameter = _named(scene, name)
+                scene = parameter.scene_at(parameter.value * (self.value / value) ** self.power(name))
+        return scene.replace(scales=scales)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Several numbers of a scene, each of which may have any value while all others stay.
+
+    Nothing goes with a number here: moduli of Ogden's material are independent, and their sum of mu alpha may be another than 2.
+
+    Parameters
+    ----------
+    scene : Scene
+    names : tuple of str
+        Places of the numbers, as listed above.
+
+    Raises
+    ------
+    InputError
+        For a name that the scene does not have.
+    """
+
+    scene: Scene
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        known = names(self.scene)
+        for name in self.names:
+            if not isinstance(name, str) or name not in known:
+                raise unknown_name("parameter", name, known or ["(this scene has no number to vary)"])
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The numbers one by one."""
+        return tuple(_named(self.scene, name) for name in self.names)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The numbers in the scene given."""
+        return tuple(parameter.value for parameter in self.parameters)
+
+    def vary(self, values: Sequence[Any]) -> Any:
+        """The parts of the scene at values that may be symbols, as :meth:`Parameter.vary`."""
+        parts, given = _parts(self.scene), dict(zip(self.names, values, strict=True))
+        # a strength stands before the whole field of a source, and the susceptibility before that of all
+        for parameter in sorted(self.parameters, key=lambda p: (p.name == "membrane.susceptibility", p.name.endswith(".strength"))):
+            if not parameter.name.startswith("material."):
+                parameter._put(parts, given[parameter.name])
+        own = {name.removeprefix("material."): value for name, value in given.items() if name.startswith("material.")}
+        if isinstance(parts.material, Ogden):
+            parts.material = _with_terms(parts.material, own)
+        elif own:
+            parts.material = _unchecked(parts.material, **own)
+        return parts
+
+
 def names(scene: Scene) -> list[str]:
     """Names of all numbers of a scene that can be varied."""
     found = [f"source.{k}.{name}" for k, source in enumerate(scene.sources) for name in _numbers(source)]
@@ -234,6 +407,30 @@ def names(scene: Scene) -> list[str]:
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]
     return found + [f"material.{name}" for name in _numbers(material)]
+
+
+def parameter_of(scene: Scene, name: str) -> Parameter | Scale:
+    """A number of a scene, or one of its scales, by its name.
+
+    Raises
+    ------
+    InputError
+        For a name that the scene does not have.
+    """
+    return Scale(scene, name) if isinstance(name, str) and name in SCALES else Parameter(scene, name)
+
+
+def _named(scene: Scene, name: str) -> Parameter:
+    """A number whose name is known to be one."""
+    named: Parameter = _unchecked(Parameter.__new__(Parameter), scene=scene, name=name)
+    return named
+
+
+def _parts(scene: Scene) -> SimpleNamespace:
+    """The parts of a scene that formulas use."""
+    kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", "material", "sources", "loads")
+    found = {name: getattr(scene, name) for name in ("susceptibility", "electricity", *MAGNETISATION, *kept)}
+    return SimpleNamespace(**found)
 
 
 def _place(mesh: Any, end: str) -> int | None:
@@ -306,6 +503,21 @@ def _with_exponent(material: Any, k: int, value: Any) -> Any:
     rest = _unchecked(material, **{key: getattr(material, key)[:k] + getattr(material, key)[k + 1 :] for key in ("mu", "alpha")})
     term = _unchecked(material, mu=material.mu[k : k + 1], alpha=material.alpha[k : k + 1])
     return _Sum((rest, _Stretched(term, value / material.alpha[k])))
+
+
+def _with_terms(material: Ogden, numbers: Mapping[str, Any]) -> Any:
+    """Ogden's material with some moduli and exponents of its terms replaced; exponents of unchanged signs."""
+    mu = tuple(numbers.get(f"mu.{k}", m) for k, m in enumerate(material.mu))
+    if not any(name.startswith("alpha.") for name in numbers):
+        return _unchecked(material, mu=mu) if numbers else material
+    whole: Any = None
+    for k, (modulus, alpha) in enumerate(zip(mu, material.alpha, strict=True)):
+        ratio = numbers[f"alpha.{k}"] / alpha if f"alpha.{k}" in numbers else None
+        # a material at stretched strains has the modulus mu/t
+        term = _unchecked(material, mu=(modulus if ratio is None else modulus * ratio,), alpha=(alpha,))
+        term = term if ratio is None else _Stretched(term, ratio)
+        whole = term if whole is None else _Sum((whole, term))
+    return whole
 
 
 @dataclass(frozen=True)

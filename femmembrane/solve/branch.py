@@ -1,7 +1,7 @@
 """Branches of equilibria of one scene: the curve E' - P V' = 0 of (x, P).
 
-Arc length is measured in the mesh-independent inner product of :func:`.state.inner`: mean square displacement over the reference area plus
-squared pressure, both in units of the membrane's own size.
+Arc length is measured in the mesh-independent inner product of :attr:`.Potential.arc_band`: mean square displacement over the reference
+area plus squared pressure, both in units of the membrane's own size.
 """
 
 from __future__ import annotations
@@ -36,28 +36,24 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def __init__(self, potential: Potential) -> None:
         self.potential, self.cornered = potential, potential.scene.tension_field or bool(potential.obstacles)
-        space = potential.space
-        self._mass, self._half_bandwidth, self._square = potential.mass, space.half_bandwidth, space.unit**2
-        self._over = potential.area * self._square
+        self._band, self._half_bandwidth = potential.arc_band, potential.space.half_bandwidth
 
     @property
     def units(self) -> Mapping[str, float]:
         return self.potential.space.units
 
     def dual(self, z: Array) -> Array:
-        weighed = band_product(self._mass, self._half_bandwidth, z[:-1])
-        return joined(weighed / self._over, float(z[-1]) * self._square)
+        return band_product(self._band, self._half_bandwidth, z)
 
     def norm(self, z: Array) -> float:
-        x, pressure = z[:-1], float(z[-1])
-        return math.sqrt(max(band_inner(self._mass, self._half_bandwidth, x, x) / self._over + pressure * pressure * self._square, 0.0))
+        return math.sqrt(max(band_inner(self._band, self._half_bandwidth, z, z), 0.0))
 
     def correct(self, guess: Array, row: Array, near: BranchPoint) -> tuple[BranchPoint | None, int]:
         result = corrected(self.potential, guess, row)
         if result.status is not Status.CONVERGED or result.bordered is None:
             return None, result.iterations
         # the border is the tangent before: the corrector's last factors give the new one for a back-substitution
-        tangent = joined(*result.bordered.solve(np.zeros_like(result.x), 1.0))
+        tangent = joined(*result.bordered.solve(np.zeros(len(result.x)), 1.0))
         return self.unit_point(State.of(result), tangent), result.iterations
 
     def unit_point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:

@@ -80,6 +80,8 @@ class BranchPoint:
     dual: Array
     sigma: float
     own: Array | None = field(default=None, kw_only=True)
+    #: rates that were asked for, as two segments ask for those of the point between them
+    _rates: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def value(self, quantity: Followed) -> float:
         """A quantity of the curve: volume, pressure or center_height by its name, or the amount of a gas."""
@@ -87,7 +89,9 @@ class BranchPoint:
 
     def rate(self, quantity: Followed) -> float:
         """Derivative of a quantity with respect to arc length: zero at a fold in that quantity."""
-        return self.rate_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        if quantity not in self._rates:
+            self._rates[quantity] = self.rate_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        return self._rates[quantity]
 
     def rate_of(self, controlled: Controlled) -> float:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
@@ -167,6 +171,10 @@ class CurveProblem(ABC, Generic[Point]):
 
     def forbids(self, before: Point, after: Point) -> bool:
         """Whether no curve leads from one point to the other, though a step did."""
+        return False
+
+    def mirrored(self, point: Point) -> bool:
+        """Whether the curve is symmetric about a point, where quantities are stationary and nothing turns."""
         return False
 
     def rest_between(self, a: Point, b: Point) -> Point | None:

@@ -209,8 +209,8 @@ class Equations:
         """:func:`relative_size` of the correction, less that of a component which is zero but for round-off and in balance to round-off."""
         change, size = self._change, self._size
         worst = _relative(change, size)
-        if TOLERANCE < worst < math.inf:
-            small = NEGLIGIBLE * max(*size, *change)
+        small = NEGLIGIBLE * max(*size, *change)
+        if TOLERANCE < worst < math.inf and (max(change[0], size[0]) <= small or max(change[1], size[1]) <= small):
             negligible = [0 < c <= small and s <= small for c, s in zip(change, size, strict=True)]
             if any(negligible):
                 kept = [0.0 if n and r <= RESIDUAL else c for n, r, c in zip(negligible, self.residuals(), change, strict=True)]

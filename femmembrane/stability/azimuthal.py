@@ -139,8 +139,8 @@ def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves
     """Where ever shorter waves with n >= 1 waves around the axis have ever lower eigenvalues; empty if nowhere.
 
     A principal mechanical stress is compressive, or does not hold the sheet against a field that turns it, so that the Legendre-Hadamard
-    condition fails. In a tension field no stress is
-    compressive. There the meridional stress may vanish; without hoop stress the operator of one n is as good as any.
+    condition fails. In a tension field no stress is compressive. There the meridional stress may vanish; without hoop stress the operator
+    of one n is as good as any.
     """
     if potential.scene.tension_field:
         bad = ill_posed(potential, evaluation)
@@ -150,6 +150,9 @@ def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves
         zone = compressed(potential, evaluation, component, supporting_all)
         if zone is not None:
             doubt = "" if zone.confirmed else f" ({UNCONFIRMED})"
+            if zone.pulled:
+                found.append(ShortWaves(str(zone), zone.confirmed))
+                continue
             what = f"{name} stress not held against the field" if zone.turned else f"{name} stress compressive"
             found.append(ShortWaves(f"{what} at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
     pulled = shears_in(potential, evaluation)

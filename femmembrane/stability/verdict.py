@@ -58,7 +58,7 @@ def axisymmetric_verdict(
     found = replace(found, mode=evaluation.expanded(found.mode))
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
-    unresolved = np.inf if shown else unresolved_axisymmetric(potential.space, evaluation, found.mode)
+    unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
 
 

@@ -21,7 +21,7 @@ from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
 from ..solve.active_set import contact_events
 from ..solve.branch import BranchProblem, first_point, oriented_point
-from ..solve.contact import stopped_by_source, touches_source
+from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS
 from ..solve.segment import Located, Segment
@@ -217,6 +217,7 @@ class TraceRun(Run[Branch]):
         self.unexplained: list[str] = []
         self._points: Iterator[BranchPoint] | None = None
         self._crossing: Crossing | None = None
+        self._sources = Watch()
 
     # --- where it sets out
 
@@ -360,7 +361,7 @@ class TraceRun(Run[Branch]):
         state, potential = point.state, self.potential_at(point)
         if unresolved := wellposed.unresolved_source(potential, state.x):
             return Status.DIPOLE_CONTACT, f"{unresolved} (V = {state.volume:.6g})"
-        if touching := touches_source(potential.distance_to_sources(state.x), potential.space.unit):
+        if touching := self._sources.touches(potential, state.x):
             return Status.DIPOLE_CONTACT, f"{touching} at V = {state.volume:.6g}"
         return None
 

@@ -85,7 +85,7 @@ def draw_branch(
     InputError
         For an unknown quantity or word, and for SI units of a scene without scales.
     """
-    of_scene = Units.of(units, branch.scene.scales)
+    of_scene = Units.of(units, branch.scene.converter)
     shown = _Shown(branch, (across, up), of_scene)
     axes.set_xlabel(_label(across, of_scene))
     axes.set_ylabel(_label(up, of_scene))

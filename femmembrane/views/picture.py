@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..files import replace_file
-from ..quantities import quantity
+from ..quantities import in_si, quantity
 from ..results.zones import KINDS
 from .backend import load
 from .surroundings import Box, surroundings
@@ -59,7 +59,7 @@ def render(
     path : path
         PNG file to write.
     quantity : str
-        What the colour shows: one of :data:`~femmembrane.views.vtk.FIELDS` (those in Pa only when the scene has scales), or "zone".
+        What the colour shows: one of :data:`~femmembrane.views.vtk.FIELDS` (those in SI units only when the scene has scales), or "zone".
     size : tuple of int
         Width and height of the picture in pixels.
 
@@ -144,9 +144,17 @@ class Surface:
 
 def check_quantity(quantity: str, scene: Scene, key: str = "quantity") -> None:
     """Raise InputError unless a colour can show the quantity."""
-    known = [name for name in FIELDS if scene.scales is not None or not name.endswith("_pa")]
+    known = [name for name in FIELDS if _has(scene, name)]
     if not isinstance(quantity, str) or quantity not in (*known, "zone"):
         raise unknown_name(key, str(quantity), (*known, "zone"))
+
+
+def _has(scene: Scene, name: str) -> bool:
+    """Whether the profiles of a scene have one of :data:`.FIELDS`."""
+    plain = next((of for of in FIELDS if quantity(of).si and in_si(of) == name), "")
+    if "electric_field" in (name, plain) and scene.electric is None:
+        return False
+    return not plain or (scene.converter is not None and scene.converter.converts(quantity(plain).si))
 
 
 @contextmanager

@@ -70,7 +70,7 @@ def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, 
 
 def report(branch: Branch, facts: Mapping[str, Any] | None = None, units: str = "scaled") -> str:
     """The page as text; see :func:`write_report`."""
-    page = _Page(branch, facts or {}, units, Units.of(units, branch.scene.scales))
+    page = _Page(branch, facts or {}, units, Units.of(units, branch.scene.converter))
     sections = [(name, body) for name, body in page.sections() if body]
     title = branch.scene.title or "Inflated membrane"
     links = "".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name, _ in sections)

@@ -82,7 +82,7 @@ def view(
     branch = list(shown) if isinstance(shown, Sequence) else [shown]
     if not branch:
         raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
-    chosen_units = Units.of(units, branch[0].scene.scales)
+    chosen_units = Units.of(units, branch[0].scene.converter)
     color = in_si(color) if chosen_units.unit(color) else color
     check_quantity(color, branch[0].scene, "color")
     place = place_of(step, len(branch))

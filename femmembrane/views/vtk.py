@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int32)
 
-#: profile quantities that a file shows as point data, in this order; quantities in Pa only when the scene has scales
-FIELDS = (*PROFILE, *(in_si(name) for name in PROFILE if quantity(name).si))
+#: profile quantities that a file shows as point data, in this order; those in SI units only when the scene has scales,
+#: and the electric field only when it has electrodes
+FIELDS = (*PROFILE, *(in_si(name) for name in PROFILE if quantity(name).si), "electric_field", in_si("electric_field"))
 SECTORS = 48
 
 

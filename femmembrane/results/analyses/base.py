@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...quantities import Quantity
+from ...quantities import Quantity, Units, heading_in, in_si, written
 
 if TYPE_CHECKING:
     import xarray
@@ -144,6 +144,14 @@ class PrintedColumn:
     heading: str
     text: Callable[[Equilibrium], str]
     width: int = 0
+
+
+def printed_in(name: str, units: Units) -> PrintedColumn:
+    """The column of a quantity in these units."""
+    head = heading_in(name, units)
+    width, shown = max(12, len(head)), in_si(name) if units.unit(name) else name
+    factor = units.factor(name)
+    return PrintedColumn(f"{head:>{width}}", lambda equilibrium: written(shown, getattr(equilibrium, name) * factor, width), width)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The public names: where each is defined. This list is the only one; ``__init__.py`` reads it."""
 
+from .calibration.measured import LabTest as LabTest
 from .discretization.curve import Curve as Curve
 from .discretization.curve import meridian_from_points as meridian_from_points
 from .discretization.meridian import Disc as Disc
@@ -63,6 +64,10 @@ from .results.equilibria import Equilibria as Equilibria
 from .results.equilibrium import Equilibrium as Equilibrium
 from .results.error_estimate import Deviation as Deviation
 from .results.error_estimate import ErrorEstimate as ErrorEstimate
+from .results.error_estimate import PlaceEstimate as PlaceEstimate
+from .results.fit import Comparison as Comparison
+from .results.fit import Fit as Fit
+from .results.fit import Plan as Plan
 from .results.folds import Cusp as Cusp
 from .results.folds import FoldCurve as FoldCurve
 from .results.postbuckling import Postbuckling as Postbuckling
@@ -94,6 +99,9 @@ from .verbs import trace_iter as trace_iter
 from .verbs import vary as vary
 from .verbs.convergence import convergence as convergence
 from .verbs.cost import cost as cost
+from .verbs.fit import compare_models as compare_models
+from .verbs.fit import fit as fit
+from .verbs.fit import plan_fit as plan_fit
 from .verbs.sweep import plan_sweep as plan_sweep
 from .verbs.sweep import sweep as sweep
 from .verbs.trace import trace as trace

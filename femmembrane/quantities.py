@@ -217,6 +217,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "kind": Quantity("kind of the special point", type=str),
     "error": Quantity("uncertainty of the special point's location"),
     "tangent": Quantity("direction of the branch on which it was found, in the unknowns and the pressure"),
+    "waves_all": Quantity("number of waves around the axis with the lowest eigenvalue", words="worst number of waves", type=int),
     "azimuthal": Quantity("number of waves around the axis of the instability that sets in", type=int),
     "amplitude": Quantity("root mean square of the part of the displacement that has waves around the axis, over R0"),
     "shift": Quantity("displacement of the pole across the axis, over R0"),
@@ -296,6 +297,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "stable_equilibria": Quantity(
         "number of them that are stable under the load's control and against the waves asked for", label="number of stable equilibria"
     ),
+    "displacement": Quantity("root mean square of the displacement over the reference area, over R0"),
+    "stress_first": Quantity("meridional Cauchy stress at the first end, over mu", words="stress at first"),
+    "stress_last": Quantity("meridional Cauchy stress at the last end, over mu", words="stress at last"),
     "state_energy": Quantity("energy that orders the equilibria, over mu T R0^2"),
     "state_stable": Quantity("whether each equilibrium is stable (1 or 0)"),
     "upright_at_start": Quantity("whether the branch starts stable against one wave around the axis (1 or 0)"),
@@ -315,6 +319,7 @@ _OF_VERDICTS: Mapping[str, Quantity] = {
     "verdict": Quantity("stability", type=str),
     "negative_directions": Quantity("number of negative eigenvalues (-1: not counted)", type=int),
     "reason": Quantity("reason of the verdict", type=str),
+    "wavelength": Quantity("length of a wave around the axis where the mode is largest, over R0"),
     "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
 }
 #: what follows the name of a quantity of each kind where it is given in SI units
@@ -367,6 +372,8 @@ def _of_verdict(name: str) -> Quantity | None:
         return _OF_VERDICTS.get(name)
     tag, _, part = name.removeprefix(kind + "_").partition("_")
     waves, known = tag[1:].isdigit(), _OF_VERDICTS[kind]
+    if tag == "all":
+        return Quantity(f"{known.meaning}, the worst number of waves", label="λ, worst n" if kind == "lambda" else "", type=known.type)
     against = f"azimuthal mode n = {tag[1:]}" if waves else f"axisymmetric shapes under {tag} control"
     return Quantity(
         f"{known.meaning}, {against}" + (f": {part}" if part else ""),

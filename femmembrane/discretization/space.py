@@ -19,7 +19,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, shape_functions
+from .elements import lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -88,6 +88,10 @@ class Space(Numbering):
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
         return shape_functions(self.degree, xi)
+
+    def second_derivatives(self, xi: Array) -> Array:
+        """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
+        return second_derivatives(self.degree, xi)
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""

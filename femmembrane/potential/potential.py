@@ -580,7 +580,8 @@ def _plain(scene: Scene) -> Scene:
     electric = scene.electricity
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
-    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
+    ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
+    plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
     return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
 
 

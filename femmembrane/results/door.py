@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from .cost import Cost
     from .equilibria import Equilibria
     from .equilibrium import Equilibrium
-    from .error_estimate import ErrorEstimate
+    from .error_estimate import ErrorEstimate, PlaceEstimate
+    from .fit import Fit
     from .folds import FoldCurve
     from .postbuckling import Postbuckling
+    from .special_point import SpecialPoint
     from .sweep import Sweep
     from .tipped import TippedBranch, TippedEquilibrium
     from .verdict import Verdict
@@ -54,7 +56,7 @@ def checked_verdict(
     pressure: float,
     evaluation: Evaluation,
     control: str | None,
-    azimuthal: int,
+    azimuthal: int | str,
     guess: Array | None = None,
     compliance: float | None = None,
 ) -> Verdict:
@@ -104,6 +106,14 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     from ..accuracy.error_estimate import estimate_errors
 
     return estimate_errors(potential, x, pressure, control, verdicts)
+
+
+def estimate_place(point: SpecialPoint) -> PlaceEstimate:
+    """See :func:`femmembrane.accuracy.place_estimate.estimate_place`."""
+    from ..accuracy.place_estimate import estimate_place
+
+    eq = point.equilibrium
+    return estimate_place(eq.potential, eq.state, eq.pressure, point.kind, point.azimuthal)
 
 
 def eigenvalue_rates(
@@ -196,6 +206,20 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Any:
     return plot_cost(study, path)
 
 
+def plot_fit(fit: Fit, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.fit.plot_fit`."""
+    from ..views.fit import plot_fit
+
+    return plot_fit(fit, path)
+
+
+def write_fit_report(fit: Fit, path: str | PathLike[str]) -> None:
+    """See :func:`femmembrane.views.fit.write_fit_report`."""
+    from ..views.fit import write_fit_report
+
+    write_fit_report(fit, path)
+
+
 def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Any:
     """See :func:`femmembrane.views.grid.plot_grid`."""
     from ..views.grid import plot_grid
@@ -222,6 +246,13 @@ def write_report(branch: Branch, path: str | PathLike[str], units: str = "scaled
     from ..views.report import write_report
 
     write_report(branch, path, units=units)
+
+
+def write_explorer(branch: Branch, path: str | PathLike[str], units: str = "scaled") -> None:
+    """See :func:`femmembrane.views.explorer.write_explorer`."""
+    from ..views.explorer import write_explorer
+
+    write_explorer(branch, path, units=units)
 
 
 def branch_html(branch: Branch) -> str:

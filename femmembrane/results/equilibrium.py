@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
-from ..scene import WRINKLING
+from ..scene import ALL, WRINKLING
 from ..scene.variation import Parameter
 from ..solve.controls import control_kind
 from ..solve.newton import relative_residual
@@ -235,15 +235,18 @@ class Equilibrium:
         space = self.potential.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
+    def verdict(
+        self, control: str | None = None, *, azimuthal: int | str = 0, gas: Gas | None = None, electric: str | None = None
+    ) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
         Parameters
         ----------
         control : {"pressure", "volume", "gas"}
             What is held against axisymmetric perturbations. Left out for azimuthal perturbations, which do not change the volume.
-        azimuthal : int
-            Number of waves around the axis; 0 for axisymmetric perturbations.
+        azimuthal : int or "all"
+            Number of waves around the axis; 0 for axisymmetric perturbations. With "all" the number whose smallest eigenvalue is the
+            lowest is looked for among all that can matter (``femmembrane.stability.worst_waves``); it is the ``azimuthal`` of the verdict.
         gas : Gas, optional
             For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found, or the amount in the chamber of
             the scene that holds it.
@@ -256,11 +259,10 @@ class Equilibrium:
         InputError
             For an unknown control, or for arguments that do not go together.
         """
-        if not (control is None or isinstance(control, str)) or not isinstance(azimuthal, (int, np.integer)):
+        counted = isinstance(azimuthal, (int, np.integer)) or (isinstance(azimuthal, str) and azimuthal == ALL)
+        if not (control is None or isinstance(control, str)) or not counted:
             raise InputError(
-                "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
-                control or azimuthal,
-                "a name and a number are allowed",
+                "control" if counted else "azimuthal", control or azimuthal, 'a name and a number are allowed, or azimuthal="all"'
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
@@ -297,7 +299,7 @@ class Equilibrium:
         return door.gas(amount, chamber.volume, chamber.atmosphere) if amount > 0 and self.volume > -chamber.volume else None
 
     @one_thread
-    def _judged(self, potential: Potential, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+    def _judged(self, potential: Potential, control: str | None, azimuthal: int | str, gas: Gas | None) -> Verdict:
         evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
         return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
@@ -392,7 +394,8 @@ class Equilibrium:
             ``_pa``, ``_m``, ... as well, while the scales stay.
         to : str or list of str
             Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
-            Numbers that go with one, as other moduli of Ogden's material do, go with it here too.
+            Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
+            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: SI numbers stay, a held pressure included.
         held : {"pressure", "volume", "center_height", "gas"}, optional
             Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
         r : array_like, optional
@@ -411,7 +414,12 @@ class Equilibrium:
         InputError
             For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
         SolveError
-            At a fold of what is held, where nothing has a derivative.
+            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+
+        Notes
+        -----
+        In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
+        border of the wrinkles passes a quadrature point.
 
         Examples
         --------
@@ -428,7 +436,7 @@ class Equilibrium:
         return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
-        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        """The membrane in space with its verdicts, for notebooks; a still picture with numbers where scripts are not allowed."""
         return door.equilibrium_html(self)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import door
 from .equilibrium import Equilibrium
+from .error_estimate import PlaceEstimate
 from .postbuckling import Postbuckling, not_an_onset
 
 Array = NDArray[np.float64]
@@ -53,6 +54,22 @@ class SpecialPoint:
     def number(self) -> float | None:
         """Value of the number of the scene over which the branch was traced; None for a branch of one scene."""
         return self.equilibrium.number(self.over) if self.over else None
+
+    def error_estimate(self) -> PlaceEstimate:
+        """By how much the mesh moves this point, from locating it again in a finer space.
+
+        Limit points, folds and azimuthal onsets have an estimate; others say why they have none.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(6), degree=2)
+        >>> point = fm.trace(scene, start=0.5, until={"center_height": 3.0}).special_points[0]
+        >>> estimate = point.error_estimate()
+        >>> print(f"P = {point.pressure:.6f}, off by {estimate.pressure.error:.0e}")
+        P = 1.879247, off by 7e-05
+        """
+        return door.estimate_place(self)
 
     def sensitivity(
         self,

@@ -14,6 +14,7 @@ from ..checks import whole
 from ..discretization.harmonics import RADIAL, VERTICAL
 from ..discretization.space import Space
 from ..potential import Array, Potential
+from .bending import Bending, bending_form, widened
 from .mode_resolution import small_eigenvalue
 from .rigid_motions import pencil_of, rigid_part
 from .second_variation import LocalResponse, response_at_quadrature, second_variation
@@ -35,14 +36,14 @@ class AzimuthalOperator:
     band, mass : ndarray, shape (3 kd + 1, n_free)
         In LAPACK general band storage.
     half_bandwidth : int
-        kd = 3 degree + 2 (2 degree + 1 for n = 0).
+        kd = 3 degree + 2 (2 degree + 1 for n = 0), and about twice that with bending.
     numbering : ndarray of int, shape (n_nodes, 3)
         Unknown of (a, c, b) at each node along the meridian; n_free stands for what is held. On the axis at n = 1, c = -a share one.
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
     density : ndarray, shape (18 or 19, n_quadrature, n_elements)
-        What ``band`` integrates: second derivatives of the quadratic form at the points, times the weights, in the order of
+        What ``band`` integrates beside bending: second derivatives of the quadratic form at the points, times the weights, in the order of
         :func:`.second_variation.pairs_of`.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
@@ -50,6 +51,8 @@ class AzimuthalOperator:
         The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
     spring : ndarray, shape (n_free,), or None
         Of a total charge at n = 0, see :class:`.Evaluation`; waves do not change the capacitance to first order.
+    bending : Bending or None
+        What the bending of the sheet adds, where the scene has it.
     """
 
     band: Array
@@ -63,6 +66,7 @@ class AzimuthalOperator:
     rigid: Array | None = None
     spin: Array | None = None
     spring: Array | None = None
+    bending: Bending | None = None
 
     def pencil(self, constraint: Array | None = None) -> Pencil:
         """K - lambda M, motions that cost nothing taken out."""
@@ -113,7 +117,11 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     uniform = potential.sheet is None and potential.electrode is None
     if n == 1 and space.spins and uniform and turns:
         spin = _spin(space, layout, response, motions, pencil_of(band, mass, layout.half_bandwidth, None, 0.0, rigid))
-    return AzimuthalOperator(band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin, spring)
+    kd, form = layout.half_bandwidth, bending_form(potential, x)
+    bending = None if form is None else form.at(int(n))
+    if bending is not None:
+        band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
+    return AzimuthalOperator(band, mass, kd, layout.numbers, int(n), response, space, density, rigid, spin, spring, bending)
 
 
 def _products(first: Array, second: Array, area: Array) -> Array:

@@ -22,6 +22,9 @@ from ..solve.state import State
 #: the quantities that can be held, by the words that users have for them
 HELD = {**{name: name for name in CONTROLS}, **PRESCRIBED, GAS: GAS}
 
+#: a number that no membrane notices, in place of 0 where all derivatives vanish: a large one may leave a tension field no state
+_SLIGHT = 1e-3
+
 
 @dataclass(frozen=True)
 class Hold:
@@ -144,6 +147,6 @@ class OverNumber:
             return
         family, value = self.family, state.evaluation.factor
         if self.parameter.even:  # at 0 all derivatives vanish
-            value = value or 1.0
+            value = value or _SLIGHT
         if not np.any(family.number_derivative(state.x, state.pressure, value)):
             raise InputError("over", self.parameter.name, "it changes no force on this membrane, so that nothing would happen")

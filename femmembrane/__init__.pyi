@@ -49,6 +49,11 @@ from .physics.mixture import maxwell_garnett as maxwell_garnett
 from .physics.named import MaterialData as MaterialData
 from .physics.named import material as material
 from .physics.named import material_data as material_data
+from .physics.obstacles import Ball as Ball
+from .physics.obstacles import CylinderObstacle as CylinderObstacle
+from .physics.obstacles import Mould as Mould
+from .physics.obstacles import Obstacle as Obstacle
+from .physics.obstacles import Plane as Plane
 from .physics.scales import Scales as Scales
 from .physics.sources import Loop as Loop
 from .physics.sources import Solenoid as Solenoid

@@ -183,6 +183,15 @@ QUANTITIES: Mapping[str, Quantity] = {
         "capacitance over eps R0^2/T", symbol="C", words="capacitance", label="capacitance CT/(εR₀²)", si="capacitance"
     ),
     "capacitance_f": Quantity("capacitance", "F", symbol="capacitance in F", words="capacitance"),
+    "contact_radius": Quantity("largest deformed radius of contact over R0"),
+    "contact_reference_radius": Quantity("reference radius of the border of contact over R0"),
+    "contact_force": Quantity("axial force on bodies over mu T R0, positive upwards"),
+    "contact_area": Quantity("deformed area in contact over R0^2"),
+    "least_gap": Quantity("least gap between a node and a body over R0"),
+    "border_end": Quantity("number of the end of elements at a border of contact, -1 for none", type=int),
+    "border_place": Quantity("place of a border of contact along the reference meridian"),
+    "gap": Quantity("gap between membrane and nearest body over R0"),
+    "contact_pressure": Quantity("pressure between membrane and body over mu T/R0"),
     "electric_field": Quantity(
         "true electric field over sqrt(mu/eps), of an equilibrium the largest", label="electric field E√(ε/μ)", si="electric_field"
     ),

@@ -64,7 +64,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     if found is None:
         return _without(control, values, method, reason)
     better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
-    errors = _errors(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better))
+    errors = _errors(control, values, _numbers(finer, found.evaluation.x, found.pressure, found.evaluation, better))
     if potential.scene.degree == _RECOVERED and finer.scene.degree == _RECOVERED + 1:
         errors |= _stress_errors(values, finer, found, control)
     errors["displacement"] = finer.space.unit * distance(finer, found.x, transferred(potential.space, x, finer.space))

@@ -51,7 +51,8 @@ def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigen
     if not operator.band.shape[1]:
         raise InputError("mesh.elements", 1, "one linear element has no unknowns with waves around the axis; two, or degree 2, are allowed")
     pencil = operator.pencil()
-    return smallest_of(pencil, pencil.block_iterations() if guess is None else guess)
+    found = smallest_of(pencil, pencil.block_iterations() if guess is None else operator.reduced(guess))
+    return found if operator.reduction is None else replace(found, mode=operator.expanded(found.mode))
 
 
 def onset_mode(potential: Potential, x: Array, pressure: float, n: int) -> tuple[NDArray[np.int64], Array]:
@@ -102,7 +103,7 @@ def lowest_eigenvalues(
     operator = azimuthal_operator(potential, x, pressure, n)
     size = operator.band.shape[1]
     count = whole("count", count, most=size - 2)
-    constraint = potential.evaluate(x, pressure).volume_gradient if n == 0 and control == "volume" else None
+    constraint = operator.reduced(potential.evaluate(x, pressure).volume_gradient) if n == 0 and control == "volume" else None
     return [(value, mode) for value, mode, _ in lowest_of(operator.pencil(constraint), count)]
 
 

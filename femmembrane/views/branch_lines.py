@@ -127,7 +127,7 @@ class Strands:
     """
 
     lines: list[tuple[Style, Array]]
-    bands: list[tuple[tuple[int, ...], Array]]
+    bands: list[tuple[tuple[int | str, ...], Array]]
     snaps: list[Array]
     steps: Array
     points: Array

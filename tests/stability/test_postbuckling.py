@@ -169,6 +169,8 @@ def test_what_is_not_known_is_said(tipped: fm.SpecialPoint) -> None:
     assert "not known" in found.words
     sloped = potential_of(eq.scene.replace(demagnetization=True))
     assert "slope" in postbuckling(sloped, eq.state, eq.pressure, 1).reason
+    bent = potential_of(eq.scene.replace(bending=True, radius_to_thickness=1000.0))
+    assert "bending" in postbuckling(bent, eq.state, eq.pressure, 1).reason
     charged = potential_of(eq.scene.replace(electric=fm.Electric(total_charge=0.1)))
     assert "total charge" in postbuckling(charged, eq.state, eq.pressure, 1).reason
 

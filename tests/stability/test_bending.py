@@ -524,3 +524,10 @@ def test_the_wrinkles_of_a_pushed_sphere() -> None:
         below, above = ([azimuthal_eigenvalue(eq.potential, eq.state, eq.pressure, n).value for n in numbers] for eq in branch[-2:])
         assert min(below) > 0 > min(above)
         assert abs(int(np.argmin(above)) - 4) <= 2
+
+
+def test_a_flat_membrane_at_rest_has_no_worst_number_of_waves() -> None:
+    """Nothing is taut and nothing pushes: every eigenvalue is 0, and the search ends at once."""
+    flat = fm.equilibrium(fm.Scene(fm.NeoHookean(), fm.disc(4), degree=2), volume=0.0)
+    verdict = flat.verdict(azimuthal="all")
+    assert (verdict.stable, verdict.smallest_eigenvalue, verdict.azimuthal) == (None, 0.0, 1)

@@ -152,7 +152,7 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
 def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     if point.kind == "azimuthal_onset":
         message = (
-            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis, which fm.trace follows; here branch points, "
             "folds and equilibria are allowed"
         )
         raise InputError("start", "azimuthal_onset", message)

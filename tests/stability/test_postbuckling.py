@@ -218,6 +218,21 @@ def test_tables_pages_and_pictures_say_it(tipped: fm.SpecialPoint, tmp_path: Any
     assert "stable against small perturbations only" in page
 
 
+def test_a_branch_from_a_file_has_it_as_well(tmp_path: Any) -> None:
+    branch = fm.trace(tipping(), start=0.5, direction=-1, until={"center_height": 0.3})
+    branch.save(tmp_path / "branch.nc")
+    found, known = (next(p for p in b.special_points or () if p.azimuthal).postbuckling for b in (fm.load(tmp_path / "branch.nc"), branch))
+    assert found.coefficient == pytest.approx(known.coefficient, rel=1e-9)
+
+
+def test_an_onset_over_a_number_of_the_scene() -> None:
+    # let down at a held volume the dipole tips the membrane over: the same jump as along the volume
+    ways: dict[str, Any] = {"over": "source.0.height", "hold": {"volume": 0.47}, "until": {"source.0.height": -3.46}}
+    point = onset_of(tipping(), start=0.47, **ways)
+    assert point.number == pytest.approx(-3.48, abs=0.02)
+    assert point.postbuckling.kind == "subcritical"
+
+
 def test_nothing_is_built_until_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     from femmembrane.results import door
 

@@ -93,6 +93,16 @@ def test_fourth_derivatives_of_the_surface_are_those_of_the_axisymmetric_potenti
     assert float(fourth.sum()) == pytest.approx(curvature, rel=1e-3)
 
 
+def test_differences_of_second_derivatives_are_as_good_as_formulas() -> None:
+    from femmembrane.potential.surface import Expansions
+
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), sources=[fm.Dipole(60.0, -2.5)], susceptibility=1.5)
+    found = Expansions(potential_of(scene))
+    rho, eta = np.linspace(1e-4, 1.0, 20), np.linspace(0.5, 0.0, 20)
+    exact, near = found.position(rho, eta)[0], found._from_second_derivatives(rho, eta)
+    assert (np.abs(near - exact).max(axis=1) < 1e-9 * np.abs(exact).max(axis=1)).all()
+
+
 def test_tipping_over_beneath_a_strong_dipole_is_a_jump_at_a_held_volume(tipped: fm.SpecialPoint) -> None:
     # an independent three-dimensional membrane code finds the tipped states on the stable side of the onset, V > 0.4479
     assert (tipped.azimuthal, round(tipped.center_height, 3), round(tipped.volume, 4)) == (1, 0.312, 0.4479)

@@ -16,7 +16,10 @@ from femmembrane.scene import Scene
 
 DEMOS = Path(__file__).parents[1] / "demos"
 #: options that make a demo quick enough for every test run; without an entry it is run whole
-QUICK = {"timings.py": ["--quick"], "sweep.py": ["--quick"], "verdict_cost.py": ["--quick"], "cost.py": ["--quick", "--growth"]}
+QUICK = {
+    **{name: ["--quick"] for name in ("timings.py", "sweep.py", "verdict_cost.py", "fit_coverage.py")},
+    "cost.py": ["--quick", "--growth"],
+}
 
 
 @pytest.mark.parametrize("script", sorted(path.name for path in DEMOS.glob("*.py")))

@@ -68,7 +68,7 @@ _ADVICE = {
     "depend on the mesh; a tension field (effects.tension_field = true) wrinkles instead",
     Status.SLACK: "where no tension is left along the meridian the membrane folds onto itself, and its tension field ends; "
     "a finer mesh comes closer to such a fold, not past it",
-    Status.PULLED_IN: "the field leaves the sheet no stiffness there and thins it without end; lower the voltage, or hold the charge",
+    Status.PULLED_IN: "nothing there resists being stretched further; lower the voltage or weaken the sources, or hold the charge",
 }
 
 

@@ -32,6 +32,8 @@ SI_UNITS: Mapping[str, str] = {
     "wire_strength": "A",
     "uniform_strength": "T",
 }
+#: the same of those that need the permittivity as well, which the electrodes of a scene know (:attr:`~femmembrane.Scene.converter`)
+ELECTRIC_UNITS: Mapping[str, str] = {"voltage": "V", "charge": "C", "capacitance": "F", "electric_field": "V/m"}
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Quantity:
     form : str
         Format of its values in tables of text.
     si : str
-        Its kind among :data:`SI_UNITS`; empty for what has no value in SI units.
+        Its kind among :data:`SI_UNITS` and :data:`ELECTRIC_UNITS`; empty for what has no value in SI units.
     type : {float, int, str}
         What its values are in files and columns.
     """
@@ -106,7 +108,7 @@ class Units:
 
     def _chosen(self, name: str) -> tuple[str, float]:
         kind = quantity(name).si
-        if self.scales is None or not kind:
+        if self.scales is None or not kind or not self.scales.converts(kind):
             return "", 1.0
         scale = float(self.scales.to_si(kind, 1.0))
         unit, size = _fitting(kind, scale)
@@ -128,16 +130,18 @@ def readable(name: str, value: float, scales: Converter) -> str:
 
 
 def readable_kind(kind: str, value: float, scales: Converter) -> str:
-    """A value of a kind of quantity, one of :data:`SI_UNITS`, in the SI unit that suits it."""
+    """A value of a kind of quantity, one of :data:`SI_UNITS` or :data:`ELECTRIC_UNITS`, in the SI unit that suits it."""
     found = float(scales.to_si(kind, value))
     unit, size = _fitting(kind, found) if kind in _READ else (SI_UNITS[kind], 1.0)
     return f"{found / size + 0.0:.4g} {unit}"
 
 
 class Converter(Protocol):
-    """What turns non-dimensional values into SI units: :class:`~femmembrane.Scales`."""
+    """What turns non-dimensional values into SI units: :class:`~femmembrane.Scales`, with the permittivity of electrodes or without."""
 
     def to_si(self, quantity: str, value: Any, /) -> Any: ...
+
+    def converts(self, quantity: str, /) -> bool: ...
 
 
 _STRESSES = {
@@ -171,10 +175,29 @@ QUANTITIES: Mapping[str, Quantity] = {
     "load_energy_j": Quantity("energy of the loads", "J", symbol="E loads in J", words="energy of the loads"),
     "electric_energy": Quantity("energy of voltage or charge over mu T R0^2", symbol="E electric", si="energy"),
     "electric_energy_j": Quantity("energy of voltage or charge", "J", symbol="E electric in J", words="energy of voltage or charge"),
-    "voltage": Quantity("voltage (Phi/T) sqrt(eps/mu)", symbol="phi", words="voltage", label="voltage φ"),
-    "charge": Quantity("charge over R0^2 sqrt(eps mu)", symbol="Q", words="charge", label="charge Q"),
-    "capacitance": Quantity("capacitance over eps R0^2/T", symbol="C", words="capacitance", label="capacitance C"),
-    "electric_field": Quantity("true electric field over sqrt(mu/eps)", label="electric field"),
+    "voltage": Quantity("voltage (Phi/T) sqrt(eps/mu)", symbol="phi", words="voltage", label="voltage φ = (Φ/T)√(ε/μ)", si="voltage"),
+    "voltage_v": Quantity("voltage", "V", symbol="voltage in V", words="voltage"),
+    "charge": Quantity("charge over R0^2 sqrt(eps mu)", symbol="Q", words="charge", label="charge Q/(R₀²√(εμ))", si="charge"),
+    "charge_c": Quantity("charge", "C", symbol="charge in C", words="charge"),
+    "capacitance": Quantity(
+        "capacitance over eps R0^2/T", symbol="C", words="capacitance", label="capacitance CT/(εR₀²)", si="capacitance"
+    ),
+    "capacitance_f": Quantity("capacitance", "F", symbol="capacitance in F", words="capacitance"),
+    "contact_radius": Quantity("largest deformed radius of contact over R0"),
+    "contact_reference_radius": Quantity("reference radius of the border of contact over R0"),
+    "contact_force": Quantity("axial force on bodies over mu T R0, positive upwards"),
+    "contact_area": Quantity("deformed area in contact over R0^2"),
+    "least_gap": Quantity("least gap between a node and a body over R0"),
+    "border_end": Quantity("number of the end of elements at a border of contact, -1 for none", type=int),
+    "border_place": Quantity("place of a border of contact along the reference meridian"),
+    "gap": Quantity("gap between membrane and nearest body over R0"),
+    "contact_pressure": Quantity("pressure between membrane and body over mu T/R0"),
+    "electric_field": Quantity(
+        "true electric field over sqrt(mu/eps), of an equilibrium the largest", label="electric field E√(ε/μ)", si="electric_field"
+    ),
+    "electric_field_v_per_m": Quantity("true electric field, of an equilibrium the largest", "V/m", words="electric field"),
+    "electric_field_profile": Quantity("true electric field along the meridian over sqrt(mu/eps)"),
+    "electric_field_v_per_m_profile": Quantity("true electric field along the meridian", "V/m"),
     "breakdown_ratio": Quantity("largest true electric field over the breakdown field"),
     "gas": Quantity("amount of gas (P + atmosphere)(V + chamber) over mu T R0^2", words="amount of gas", label="amount of gas"),
     "residual": Quantity("out-of-balance force relative to the forces in balance"),
@@ -203,7 +226,14 @@ QUANTITIES: Mapping[str, Quantity] = {
     "kind": Quantity("kind of the special point", type=str),
     "error": Quantity("uncertainty of the special point's location"),
     "tangent": Quantity("direction of the branch on which it was found, in the unknowns and the pressure"),
+    "waves_all": Quantity("number of waves around the axis with the lowest eigenvalue", words="worst number of waves", type=int),
     "azimuthal": Quantity("number of waves around the axis of the instability that sets in", type=int),
+    "amplitude": Quantity("root mean square of the part of the displacement that has waves around the axis, over R0"),
+    "shift": Quantity("displacement of the pole across the axis, over R0"),
+    "harmonics": Quantity("number of harmonics around the axis beside the constant one", type=int),
+    "truncation": Quantity("estimated root mean square of the harmonics left out, over R0"),
+    "postbuckling": Quantity("whether it sets in gradually (supercritical) or with a jump (subcritical) at a held volume", type=str),
+    "postbuckling_coefficient": Quantity("its coefficient b of Koiter at a held volume, over mu T R0^2", words="coefficient b"),
     "trace_border": Quantity("softest displacement at the last point of a trace over a number"),
     "trace_sigma": Quantity("arc length, or load, at the last points of the path"),
     "trace_point": Quantity("state and pressure at the last points of the path"),
@@ -276,6 +306,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "stable_equilibria": Quantity(
         "number of them that are stable under the load's control and against the waves asked for", label="number of stable equilibria"
     ),
+    "displacement": Quantity("root mean square of the displacement over the reference area, over R0"),
+    "stress_first": Quantity("meridional Cauchy stress at the first end, over mu", words="stress at first"),
+    "stress_last": Quantity("meridional Cauchy stress at the last end, over mu", words="stress at last"),
     "state_energy": Quantity("energy that orders the equilibria, over mu T R0^2"),
     "state_stable": Quantity("whether each equilibrium is stable (1 or 0)"),
     "upright_at_start": Quantity("whether the branch starts stable against one wave around the axis (1 or 0)"),
@@ -286,6 +319,8 @@ QUANTITIES: Mapping[str, Quantity] = {
 PLACES = ("volume", "pressure", "center_height")
 #: stretches and stresses along the meridian
 PROFILE = ("stretch_1", "stretch_2", *_STRESSES)
+#: what a membrane with a voltage or a charge has besides, and its profile
+ELECTRIC = ("voltage", "charge", "capacitance", "electric_field")
 #: of the quantities of a verdict, whose names go on with a control or the number of waves
 _OF_VERDICTS: Mapping[str, Quantity] = {
     "lambda_error": Quantity("bound on the algebraic error of the smallest eigenvalue"),
@@ -293,10 +328,21 @@ _OF_VERDICTS: Mapping[str, Quantity] = {
     "verdict": Quantity("stability", type=str),
     "negative_directions": Quantity("number of negative eigenvalues (-1: not counted)", type=int),
     "reason": Quantity("reason of the verdict", type=str),
+    "wavelength": Quantity("length of a wave around the axis where the mode is largest, over R0"),
     "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
 }
 #: what follows the name of a quantity of each kind where it is given in SI units
-_IN_SI = {"length": "m", "volume": "m3", "pressure": "pa", "stress": "pa", "energy": "j"}
+_IN_SI = {
+    "length": "m",
+    "volume": "m3",
+    "pressure": "pa",
+    "stress": "pa",
+    "energy": "j",
+    "voltage": "v",
+    "charge": "c",
+    "capacitance": "f",
+    "electric_field": "v_per_m",
+}
 #: units in which a person reads a quantity, from small to large, and what they are in SI units
 _READ: Mapping[str, tuple[tuple[str, float], ...]] = {
     "length": (("µm", 1e-6), ("mm", 1e-3), ("m", 1.0)),
@@ -304,6 +350,10 @@ _READ: Mapping[str, tuple[tuple[str, float], ...]] = {
     "pressure": (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6)),
     "stress": (("Pa", 1.0), ("kPa", 1e3), ("MPa", 1e6)),
     "energy": (("µJ", 1e-6), ("mJ", 1e-3), ("J", 1.0)),
+    "voltage": (("mV", 1e-3), ("V", 1.0), ("kV", 1e3)),
+    "charge": (("nC", 1e-9), ("µC", 1e-6), ("mC", 1e-3), ("C", 1.0)),
+    "capacitance": (("pF", 1e-12), ("nF", 1e-9), ("µF", 1e-6), ("mF", 1e-3), ("F", 1.0)),
+    "electric_field": (("V/m", 1.0), ("kV/m", 1e3), ("MV/m", 1e6)),
 }
 #: words for the units in which pictures and pages show quantities
 SYSTEMS = ("scaled", "si")
@@ -331,6 +381,8 @@ def _of_verdict(name: str) -> Quantity | None:
         return _OF_VERDICTS.get(name)
     tag, _, part = name.removeprefix(kind + "_").partition("_")
     waves, known = tag[1:].isdigit(), _OF_VERDICTS[kind]
+    if tag == "all":
+        return Quantity(f"{known.meaning}, the worst number of waves", label="λ, worst n" if kind == "lambda" else "", type=known.type)
     against = f"azimuthal mode n = {tag[1:]}" if waves else f"axisymmetric shapes under {tag} control"
     return Quantity(
         f"{known.meaning}, {against}" + (f": {part}" if part else ""),
@@ -398,6 +450,13 @@ def _in_units(values: Mapping[str, float], units: Units) -> Iterator[tuple[str, 
 def in_si(name: str) -> str:
     """The name of a quantity that is given in SI units."""
     return f"{name}_{_IN_SI[QUANTITIES[name].si]}"
+
+
+def electric_quantities(scene: Any) -> tuple[str, ...]:
+    """Those of :data:`ELECTRIC` that a scene has: electrodes with a frozen charge have no voltage, and so no capacitance."""
+    if scene.electric is None:
+        return ()
+    return tuple(name for name in ELECTRIC if scene.electric.frozen_charge is None or name not in ("voltage", "capacitance"))
 
 
 def si_values(values: Mapping[str, Any], scales: Converter) -> dict[str, Any]:

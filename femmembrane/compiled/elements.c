@@ -308,6 +308,34 @@ static int bordered(const Elements *s, Border *b, const double *stiffness, const
     return 0;
 }
 
+/* The integrand of x . K x at the quadrature points: per element its sum with weights, in size, and the sizes of its terms; sums of both */
+EACH_PROCESSOR static void form_parts(const Elements *s, const double *stiffness, const double *x, const double *weights, double parts[2])
+{
+    const int nq = s->n_quadrature;
+    const Py_ssize_t step = s->block, ne = s->n_elements;
+    double *weighed = s->registers, *sizes = weighed + step; /* free between evaluations, and larger */
+    parts[0] = parts[1] = 0.0;
+    for (Py_ssize_t first = 0; first < ne; first += step) {
+        const Py_ssize_t lanes = ne - first < step ? ne - first : step;
+        interpolate(s, x, first, lanes);
+        memset(weighed, 0, sizeof(double) * lanes), memset(sizes, 0, sizeof(double) * lanes);
+        for (int i = 0; i < 4; i++)
+            for (int j = i; j < 4; j++)
+                for (int q = 0; q < nq; q++) {
+                    const double *a = s->local + (i * nq + q) * lanes, *b = s->local + (j * nq + q) * lanes;
+                    const double *k = stiffness + (PAIR[i][j] * nq + q) * ne + first, times = i == j ? 1.0 : 2.0;
+                    INDEPENDENT
+                    for (Py_ssize_t e = 0; e < lanes; e++) {
+                        const double term = times * k[e] * (a[e] * b[e]);
+                        weighed[e] += weights[q] * term;
+                        sizes[e] += fabs(term);
+                    }
+                }
+        for (Py_ssize_t e = 0; e < lanes; e++)
+            parts[0] += fabs(weighed[e]), parts[1] += sizes[e];
+    }
+}
+
 /* ---- Python --------------------------------------------------------------------------------------------------------------------- */
 
 static void elements_dealloc(PyObject *self)
@@ -533,6 +561,23 @@ static PyObject *elements_force_scale(PyObject *self, PyObject *args)
     return bad ? NULL : Py_BuildValue("(dd)", scale[0], scale[1]);
 }
 
+/* form_parts(densities, x, weights): of the integrand of x . K x, with weights at the quadrature points of an element */
+static PyObject *elements_form_parts(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    PyObject *o[3];
+    Py_buffer d = {0}, x = {0}, w = {0};
+    double parts[2];
+    if (!PyArg_ParseTuple(args, "OOO", &o[0], &o[1], &o[2]))
+        return NULL;
+    const int bad = take_array(o[0], &d, 'd', N_DENSITY * s->n_points, 0, "densities") < 0 ||
+                    take_array(o[1], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[2], &w, 'd', s->n_quadrature, 0, "weights") < 0;
+    if (!bad)
+        form_parts(s, (double *)d.buf + N_FORCE * s->n_points, x.buf, w.buf, parts);
+    PyBuffer_Release(&d), PyBuffer_Release(&x), PyBuffer_Release(&w);
+    return bad ? NULL : Py_BuildValue("(dd)", parts[0], parts[1]);
+}
+
 /* a new object with the factors of [K, -V'; row, corner], or NULL with an exception set */
 static BorderObject *new_border(const Elements *s, const double *densities, const double *volume_gradient, const double *row, double corner)
 {
@@ -593,6 +638,7 @@ static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadratur
                                          {"assemble", elements_assemble, METH_VARARGS, NULL},
                                          {"largest", elements_largest, METH_O, NULL},
                                          {"force_scale", elements_force_scale, METH_VARARGS, NULL},
+                                         {"form_parts", elements_form_parts, METH_VARARGS, NULL},
                                          {"border", elements_border, METH_VARARGS, NULL},
                                          {"step", elements_step, METH_VARARGS, NULL},
                                          {NULL, NULL, 0, NULL}};

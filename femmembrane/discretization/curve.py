@@ -24,7 +24,19 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import store, switch
 from ..errors import InputError
 from .merging import mended, merged
-from .meridian import LEAST_LENGTH, ROUND_OFF, Array, check_elements, extent
+from .meridian import (
+    LEAST_LENGTH,
+    ROUND_OFF,
+    Array,
+    Asked,
+    check_accuracy,
+    check_elements,
+    checked_ends,
+    extent,
+    halved,
+    is_open,
+    refuse_open,
+)
 from .supports import POLE, Held, Support, checked_end, support_of
 
 #: size of a curve beyond which squares and cubes of it are no numbers any more, and below the inverse of which they are zero
@@ -53,6 +65,13 @@ class Curve:
     repaired : sequence of str
         In words, what was done about points that agree to round-off only. What is done here is added; no number depends on it.
 
+    ends : sequence of float, optional
+        Ends of the elements along the curve, in place of ``divisions``; every end of a cell is among them.
+    accuracy : float, optional
+        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of ``divisions``.
+    estimated : float, optional
+        The relative error that was estimated when the mesh was chosen. Such a mesh has ``accuracy`` and ``ends`` as well.
+
     Raises
     ------
     InputError
@@ -65,6 +84,9 @@ class Curve:
     first: Held = "clamped"
     last: Held = "clamped"
     repaired: tuple[str, ...] = field(default=(), compare=False)
+    ends: tuple[float, ...] | None = None
+    accuracy: Asked | None = None
+    estimated: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", _points(self.points))
@@ -84,6 +106,26 @@ class Curve:
         object.__setattr__(self, "repaired", self.repaired + remarks)
         _check_curve(self)
         object.__setattr__(self, "points", _tuples(_directed(np.array(self.points), self.curved)))
+        check_accuracy(self, "ends", given=self.divisions != 1)
+        if self.ends is not None:
+            object.__setattr__(self, "ends", self._checked_ends())
+
+    def _checked_ends(self) -> tuple[float, ...]:
+        if self.divisions != 1:
+            raise InputError("mesh.divisions", self.divisions, "not allowed together with mesh.ends, which say all; leave one out")
+        cells = self._cell_ends()
+        ends = np.array(checked_ends("mesh.ends", self.ends, 0.0, float(cells[-1]), ("the first end", "the last end")))
+        for cell in cells:
+            k = int(np.abs(ends - cell).argmin())
+            if abs(ends[k] - cell) > LEAST_LENGTH * cells[-1]:
+                raise InputError("mesh.ends", float(ends[k]), f"the end of a cell at {cell:.9g} must be among them")
+            ends[k] = cell
+        return tuple(ends.tolist())
+
+    @property
+    def open(self) -> bool:
+        """Whether the elements are still to be chosen."""
+        return is_open(self)
 
     @property
     def shape(self) -> str:
@@ -96,7 +138,7 @@ class Curve:
 
     @property
     def elements(self) -> int:
-        return self.divisions * self._n_cells
+        return self.divisions * self._n_cells if self.ends is None else len(self.ends) - 1
 
     @property
     def _n_cells(self) -> int:
@@ -119,7 +161,13 @@ class Curve:
         slope = (4 * t - 3) * a + (4 - 8 * t) * m + (4 * t - 1) * b
         return np.concatenate([[0.0], np.cumsum(_GAUSS[1] @ np.hypot(slope[..., 0], slope[..., 1]) / 2)])
 
+    def corners(self) -> Array:
+        """Places at which elements must end: the ends of the cells."""
+        return self._cell_ends()
+
     def breakpoints(self) -> Array:
+        if self.ends is not None:
+            return np.array(self.ends)
         ends = self._cell_ends()
         return np.interp(np.arange(self.elements + 1) / self.divisions, np.arange(ends.size), ends)
 
@@ -146,8 +194,21 @@ class Curve:
         slope = b - a + (4 * (1 - 2 * t[..., None]) * (m - (a + b) / 2) if self.curved else 0.0)
         return slope[..., 0] / size, slope[..., 1] / size
 
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
+        return replace(self, divisions=1, ends=tuple(float(s) for s in ends), accuracy=accuracy, estimated=estimated)
+
     def refined(self) -> Self:
-        return replace(self, divisions=2 * self.divisions)
+        """The same curve with every element divided in two.
+
+        Raises
+        ------
+        InputError
+            For a mesh whose elements are still to be chosen.
+        """
+        refuse_open(self)
+        if self.ends is None:
+            return replace(self, divisions=2 * self.divisions)
+        return self.on_ends(halved(self.breakpoints()))
 
     def with_elements(self, elements: int) -> Self:
         """The same curve with another number of elements, a multiple of that of its cells.
@@ -158,7 +219,7 @@ class Curve:
         """
         if elements % self._n_cells:
             raise InputError("elements", elements, f"a multiple of the {self._n_cells} cells of the curve is allowed")
-        return replace(self, divisions=elements // self._n_cells)
+        return replace(self, divisions=elements // self._n_cells, ends=None, accuracy=None, estimated=None)
 
     def supports(self) -> tuple[Support, Support] | tuple[()]:
         if self.closed:
@@ -177,6 +238,7 @@ def meridian_from_points(
     divisions: int = 1,
     first: Held = "clamped",
     last: Held = "clamped",
+    accuracy: Asked | None = None,
 ) -> Curve:
     """A meridian from points and the cells between them, brought into the order that the module describes.
 
@@ -186,7 +248,7 @@ def meridian_from_points(
         (R, Z) in units of R0.
     cells : array_like of int, shape (m, 2) or (m, 3), optional
         Positions of the two ends of each cell, and of the point inside. Default: straight cells through the points, in their order.
-    divisions, first, last
+    divisions, first, last, accuracy
         As for :class:`Curve`.
 
     Returns
@@ -200,8 +262,8 @@ def meridian_from_points(
     """
     array = _array(points)
     if cells is None:
-        return Curve(points=_tuples(array), divisions=divisions, first=first, last=last)
-    return ordered_curve(array, np.asarray(cells), divisions=divisions, first=first, last=last)
+        return Curve(points=_tuples(array), divisions=divisions, first=first, last=last, accuracy=accuracy)
+    return ordered_curve(array, np.asarray(cells), divisions=divisions, first=first, last=last, accuracy=accuracy)
 
 
 def _array(points: Any) -> Array:

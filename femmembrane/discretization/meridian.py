@@ -17,16 +17,16 @@ So a dome is filled from below and a bowl from above. A liquid with gamma > 0 (:
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import FINITE, between, is_number, whole
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from .supports import CLAMPED, POLE, Held, Support, checked_end, support_of
 
 Array = NDArray[np.float64]
@@ -43,6 +43,62 @@ ROUND_OFF = 1e-6
 LEAST_LENGTH = 1e-12
 #: ratios of sizes reach from one over this to this: beyond, the smallest elements drown in round-off
 MAX_RATIO = 1e6
+
+
+@dataclass(frozen=True)
+class Accuracy(Mapping[str, float]):
+    """Relative accuracies by what they are asked of: ``accuracy = {pressure = 1e-8, eigenvalues = 1e-4, profile = 1e-6}``.
+
+    Parameters
+    ----------
+    pressure : float, optional
+        Of P and of the total energy at the same volume.
+    eigenvalues : float, optional
+        Of the smallest axisymmetric eigenvalues under pressure and volume control, over their size; where they pass through zero over a
+        hundredth of the largest size along the run.
+    profile : float, optional
+        Of the displacement, root mean square over the membrane, over its own root mean square.
+    """
+
+    pressure: float | None = None
+    eigenvalues: float | None = None
+    profile: float | None = None
+
+    def __getitem__(self, key: str) -> float:
+        value = getattr(self, key) if key in ACCURATE else None
+        if value is None:
+            raise KeyError(key)
+        return float(value)
+
+    def __iter__(self) -> Iterator[str]:
+        return (key for key in ACCURATE if getattr(self, key) is not None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    @property
+    def tightest(self) -> float:
+        """The smallest of them."""
+        return min(self.values())
+
+    def __str__(self) -> str:
+        return "{" + ", ".join(f"{key} = {value:g}" for key, value in self.items()) + "}"
+
+
+#: an accuracy as a user names it: of P and the energy, or by what it is asked of
+Asked: TypeAlias = float | Mapping[str, float]
+#: what an accuracy may be asked of
+ACCURATE = ("pressure", "eigenvalues", "profile")
+
+
+def by_quantity(accuracy: Asked) -> Accuracy:
+    """Accuracies by what they are asked of; a number is asked of P and the energy."""
+    return accuracy if isinstance(accuracy, Accuracy) else Accuracy(**accuracy) if isinstance(accuracy, Mapping) else Accuracy(accuracy)
+
+
+def in_words(accuracy: Asked) -> str:
+    """An accuracy for messages."""
+    return str(by_quantity(accuracy)) if isinstance(accuracy, Mapping) else f"{accuracy:g}"
 
 
 class Meridian(Hashable, Protocol):
@@ -88,6 +144,17 @@ class Meridian(Hashable, Protocol):
         elements : int
         """
 
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
+        """The same shape on elements that end at given places.
+
+        Parameters
+        ----------
+        ends : sequence of float
+            Parameters s, from the first end of the meridian to its last.
+        accuracy, estimated : float, optional
+            The relative accuracy that these elements were chosen for, and the error that was estimated.
+        """
+
     def supports(self) -> tuple[Support | frozenset[str], Support | frozenset[str]] | tuple[()]:
         """How the first and the last point are held; nothing for a closed curve.
 
@@ -115,8 +182,9 @@ class Disc:
     radii : sequence of float, optional
         Ends of the elements, over R0, strictly increasing from 0 to 1. They give any other grading, in place of ``elements`` and ``ratio``.
     accuracy : float, optional
-        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all of the above. Until they are
-        chosen the mesh is open: it has no elements, and nothing can be computed on it.
+        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all of the above. A number is asked
+        of P and of the energy, a mapping of what it names (:class:`Accuracy`). Until they are chosen the mesh is open: it has no elements,
+        and nothing can be computed on it.
     rim : str or mapping
         How the rim is held, "clamped", and where if not at radius 1 and height 0: ``{"kind": "clamped", "radius": 1.2, "height": 0.3}``.
     estimated : float, optional
@@ -131,7 +199,7 @@ class Disc:
     elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
     ratio: float = 1.0
     radii: tuple[float, ...] | None = None
-    accuracy: float | None = None
+    accuracy: Asked | None = None
     estimated: float | None = None
     rim: Held = field(default=CLAMPED, metadata={"quiet": True})
 
@@ -139,11 +207,11 @@ class Disc:
         object.__setattr__(self, "rim", checked_end("mesh.rim", self.rim))
         if (self.rim if isinstance(self.rim, str) else self.rim["kind"]) != CLAMPED:
             raise InputError("mesh.rim", self.rim, "the rim of a disc is clamped; a cap of height 0 is flat too and takes every support")
-        _check_accuracy(self)
+        check_accuracy(self, "radii", given=self.elements is not None or self.ratio != 1)
         if self.open:
             return
         ratio = check_ratio(self.ratio, "size at the rim over size at the pole")
-        radii = None if self.radii is None else _radii(self.radii)
+        radii = None if self.radii is None else checked_ends("mesh.radii", self.radii, 0.0, 1.0, ("the pole", "the rim"))
         follows = ELEMENTS if radii is None else len(radii) - 1
         elements = check_elements(follows if self.elements is None else self.elements)
         if radii is not None and elements != follows:
@@ -160,7 +228,7 @@ class Disc:
     @property
     def open(self) -> bool:
         """Whether the elements are still to be chosen."""
-        return self.accuracy is not None and self.estimated is None
+        return is_open(self)
 
     def breakpoints(self) -> Array:
         if self.open:
@@ -183,14 +251,10 @@ class Disc:
         InputError
             For a mesh whose elements are still to be chosen.
         """
-        if self.open:
-            raise InputError("mesh.accuracy", self.accuracy, "its elements are still to be chosen; refine the mesh of a branch's scene")
+        refuse_open(self)
         if self.ratio == 1 and self.radii is None:
             return replace(self, elements=2 * self.elements)
-        ends = self.breakpoints()
-        halved = np.empty(2 * self.elements + 1)
-        halved[::2], halved[1::2] = ends, ends[:-1] + np.diff(ends) / 2
-        return self._ending(halved)
+        return self.on_ends(halved(self.breakpoints()))
 
     def with_elements(self, elements: int) -> Self:
         """Another number of elements whose ends are the same function of k/elements.
@@ -204,13 +268,12 @@ class Disc:
         if elements == self.elements:
             return self
         if self.radii is not None:
-            ends = np.interp(np.linspace(0, self.elements, elements + 1), np.arange(self.elements + 1), self.radii)
-            return self._ending(ends)
+            return self.on_ends(like(self.radii, elements))
         return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
 
-    def _ending(self, radii: Array) -> Self:
-        """The same disc with elements that end at given radii."""
-        return type(self)(radii=tuple(radii), rim=self.rim)
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
+        radii = tuple(float(r) for r in ends)
+        return type(self)(radii=radii, accuracy=accuracy, estimated=estimated, rim=self.rim)
 
     def supports(self) -> tuple[Support, Support]:
         return POLE, support_of(self.rim)
@@ -220,7 +283,7 @@ def disc(
     elements: int | None = None,
     ratio: float = 1.0,
     radii: Sequence[float] | None = None,
-    accuracy: float | None = None,
+    accuracy: Asked | None = None,
     rim: Held = CLAMPED,
 ) -> Disc:
     """Mesh of the flat, clamped disc.
@@ -258,28 +321,70 @@ def disc(
     return Disc(elements=elements, ratio=ratio, radii=radii, accuracy=accuracy, rim=rim)  # type: ignore[arg-type]  # checked there
 
 
-def _check_accuracy(mesh: Disc) -> None:
-    """Raise InputError unless a mesh is given, open, or chosen for an accuracy."""
+def is_open(mesh: Any) -> bool:
+    """Whether the elements of a mesh are still to be chosen for its accuracy."""
+    return mesh.accuracy is not None and mesh.estimated is None
+
+
+def refuse_open(mesh: Any) -> None:
+    """Raise InputError for a mesh whose elements are still to be chosen."""
+    if mesh.open:
+        raise InputError("mesh.accuracy", mesh.accuracy, "its elements are still to be chosen; refine the mesh of a branch's scene")
+
+
+def halved(ends: Array) -> Array:
+    """Ends of elements, and the middles between them."""
+    found = np.empty(2 * ends.size - 1)
+    found[::2], found[1::2] = ends, ends[:-1] + np.diff(ends) / 2
+    return found
+
+
+def like(ends: Sequence[float], elements: int) -> Array:
+    """Ends of another number of elements that are the same function of k/elements, linear between the given ones."""
+    n = len(ends) - 1
+    return np.interp(np.linspace(0, n, elements + 1), np.arange(n + 1), ends)
+
+
+def check_accuracy(mesh: Any, places: str, *, given: bool) -> None:
+    """Raise InputError unless the elements of a mesh are given, open, or chosen for an accuracy.
+
+    Parameters
+    ----------
+    mesh : Meridian
+        With the attributes accuracy and estimated, and one named ``places`` for the ends of its elements.
+    places : str
+    given : bool
+        Whether there is anything else that says how long its elements are.
+    """
     if mesh.accuracy is None:
         if mesh.estimated is not None:
             raise InputError("mesh.estimated", mesh.estimated, "it belongs to a mesh that was chosen for mesh.accuracy; leave it out")
         return
-    _positive("mesh.accuracy", mesh.accuracy, MOST_ACCURACY, LEAST_ACCURACY, " (relative error of the pressure and the energy)")
+    object.__setattr__(mesh, "accuracy", _checked_accuracy(mesh.accuracy))
     if mesh.estimated is not None:
         _positive("mesh.estimated", mesh.estimated, 0.0, math.inf, "")
-    if (mesh.estimated is None) != (mesh.radii is None):
-        key = "radii" if mesh.estimated is None else "estimated"
-        raise InputError(
-            f"mesh.{key}", getattr(mesh, key), "not allowed together with mesh.accuracy, for which the mesh is chosen; leave one out"
-        )
-    if mesh.open and (mesh.elements is not None or mesh.ratio != 1):
-        key = "ratio" if mesh.elements is None else "elements"
-        raise InputError(
-            f"mesh.{key}", getattr(mesh, key), "not allowed together with mesh.accuracy, for which the mesh is chosen; leave one out"
-        )
-    for name in ("accuracy", "estimated"):
-        if getattr(mesh, name) is not None:
-            object.__setattr__(mesh, name, float(getattr(mesh, name)))
+    chosen = "not allowed together with mesh.accuracy, for which the mesh is chosen; leave one out"
+    if (mesh.estimated is None) != (getattr(mesh, places) is None):
+        key = places if mesh.estimated is None else "estimated"
+        raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
+    if mesh.open and given:
+        key = next(key for key in ("elements", "divisions", "ratio") if getattr(mesh, key, None) not in (None, 1))
+        raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
+    if mesh.estimated is not None:
+        object.__setattr__(mesh, "estimated", float(mesh.estimated))
+
+
+def _checked_accuracy(given: Any) -> float | Accuracy:
+    if not isinstance(given, Mapping):
+        _positive("mesh.accuracy", given, MOST_ACCURACY, LEAST_ACCURACY, " (relative error of the pressure and the energy), or a table")
+        return float(given)
+    for name, value in given.items():
+        if name not in ACCURATE:
+            raise unknown_name(f"mesh.accuracy.{name}", value, ACCURATE)
+        _positive(f"mesh.accuracy.{name}", value, MOST_ACCURACY, LEAST_ACCURACY, " (relative error)")
+    if not given:
+        raise InputError("mesh.accuracy", {}, "a number, or a table with one or more of these is allowed: " + ", ".join(ACCURATE))
+    return Accuracy(**{name: float(value) for name, value in given.items()})
 
 
 def _positive(key: str, value: Any, least: float, most: float, what: str) -> None:
@@ -340,21 +445,32 @@ def graded_alike(elements: int, ratio: float, other: int) -> float:
     return min(max(math.exp(growth * (other - 1) / other), 1 / MAX_RATIO), MAX_RATIO)
 
 
-def _radii(values: Any) -> tuple[float, ...]:
-    allowed = "a list of numbers that increase strictly from 0 (the pole) to 1 (the rim) is allowed"
+def checked_ends(key: str, values: Any, first: float, last: float, words: tuple[str, str]) -> tuple[float, ...]:
+    """Ends of elements from one place to another, or InputError.
+
+    Parameters
+    ----------
+    key : str
+    values : object
+    first, last : float
+    words : (str, str)
+        What is at the first and the last place.
+    """
+    allowed = f"a list of numbers that increase strictly from {first:.9g} ({words[0]}) to {last:.9g} ({words[1]}) is allowed"
     if isinstance(values, (str, bytes)):
-        raise InputError("mesh.radii", values, allowed)
+        raise InputError(key, values, allowed)
     try:
         ends = tuple(values)
     except TypeError:
-        raise InputError("mesh.radii", values, allowed) from None
+        raise InputError(key, values, allowed) from None
     for k, end in enumerate(ends):
         if not is_number(end):
-            raise InputError(f"mesh.radii[{k}]", end, FINITE)
-    if len(ends) < 2 or not abs(ends[0]) <= LEAST_LENGTH or not abs(ends[-1] - 1) <= LEAST_LENGTH:
-        raise InputError("mesh.radii", ends, allowed)
-    ends = (0.0, *ends[1:-1], 1.0)  # computed ends are 0 and 1 to round-off only
+            raise InputError(f"{key}[{k}]", end, FINITE)
+    near = LEAST_LENGTH * max(abs(first), abs(last))
+    if len(ends) < 2 or not abs(ends[0] - first) <= near or not abs(ends[-1] - last) <= near:
+        raise InputError(key, ends, allowed)
+    ends = (first, *ends[1:-1], last)  # computed ends are exact to round-off only
     for k in range(1, len(ends)):
         if not ends[k - 1] < ends[k]:
-            raise InputError(f"mesh.radii[{k}]", ends[k], f"a number above the one before ({ends[k - 1]:.9g}) is allowed")
+            raise InputError(f"{key}[{k}]", ends[k], f"a number above the one before ({ends[k - 1]:.9g}) is allowed")
     return tuple(float(end) for end in ends)

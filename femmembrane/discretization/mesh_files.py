@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, unknown_name
 from .curve import Curve, ordered_curve
 from .dialects import READERS, Lines, UnreadableError, read_lines
-from .meridian import ROUND_OFF, Array, Meridian
+from .meridian import ROUND_OFF, Array, Asked, Meridian
 from .supports import Held
 
 #: kinds of files that are written, and read as well, by their suffix; with the format that meshio is to write
@@ -30,6 +30,7 @@ def read_meridian(
     divisions: int = 1,
     first: Held = "clamped",
     last: Held = "clamped",
+    accuracy: Asked | None = None,
 ) -> Curve:
     """A meridian from a mesh file (.vtu, .msh, .vtk, .xdmf, .vtp, .inp), see :mod:`.dialects`.
 
@@ -39,7 +40,7 @@ def read_meridian(
     group : str or int, optional
         The physical group of the meridian: its name, or its number where it has no name. In .msh it is a physical curve, in .inp a set of
         elements, in .xdmf one of several grids. Left out: all lines of the file.
-    divisions, first, last
+    divisions, first, last, accuracy
         As for :class:`Curve`.
 
     Returns
@@ -66,7 +67,7 @@ def read_meridian(
         raise InputError("mesh.file", str(path), f"cannot be read ({error.strerror or error})") from None
     cells = _chosen(str(path), lines, group)
     try:
-        return ordered_curve(*_in_plane(lines.points, cells), divisions=divisions, first=first, last=last)
+        return ordered_curve(*_in_plane(lines.points, cells), divisions=divisions, first=first, last=last, accuracy=accuracy)
     except InputError as error:
         if error.key != "mesh.points":
             raise

@@ -24,29 +24,66 @@ torus    the radius of the tube                                              R =
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ..checks import between, store
-from .meridian import ELEMENTS, Array, check_elements, check_ratio, geometric_ends, graded_alike
+from ..errors import InputError
+from .meridian import (
+    ELEMENTS,
+    Array,
+    Asked,
+    check_accuracy,
+    check_elements,
+    check_ratio,
+    checked_ends,
+    geometric_ends,
+    graded_alike,
+    halved,
+    is_open,
+    like,
+    refuse_open,
+)
 from .supports import POLE, Held, Support, checked_end, support_of
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Graded:
-    """An open curve from s = ``start`` to ``stop`` with elements in geometric progression."""
+class _Divided:
+    """A smooth curve from s = ``start`` to ``stop``, divided into elements: equal ones, those that end at ``ends``, or none yet where an
+    accuracy is asked for.
+    """
 
-    elements: int = ELEMENTS
-    ratio: float = 1.0
+    elements: int = None  # type: ignore[assignment]  # an int as soon as the mesh is made
+    ends: tuple[float, ...] | None = None
+    accuracy: Asked | None = None
+    estimated: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "elements", check_elements(self.elements))
-        object.__setattr__(self, "ratio", check_ratio(self.ratio, "size of the last element over size of the first"))
-        for f in fields(self):
-            if f.name in _ENDS:
-                store(self, **{f.name: checked_end(f"mesh.{f.name}", getattr(self, f.name))})
+        self._numbers()
+        ratio = getattr(self, "ratio", 1.0)
+        check_accuracy(self, "ends", given=self.elements is not None or ratio != 1)
+        if self.open:
+            return
+        ends = None
+        if self.ends is not None:
+            ends = checked_ends("mesh.ends", self.ends, self.start, self.stop, ("the first end", "the last end"))
+            if ratio != 1:
+                raise InputError("mesh.ratio", ratio, "not allowed together with mesh.ends, which say all about the sizes; leave one out")
+        follows = ELEMENTS if ends is None else len(ends) - 1
+        elements = check_elements(follows if self.elements is None else self.elements, self._least)
+        if ends is not None and elements != follows:
+            raise InputError("mesh.elements", elements, f"it contradicts mesh.ends, the ends of {follows}; leave elements out")
+        object.__setattr__(self, "ends", ends)
+        object.__setattr__(self, "elements", elements)
+
+    def _numbers(self) -> None:
+        """Convert and check what the shape has besides."""
+
+    #: fewest elements
+    _least: ClassVar[int] = 1
 
     @property
     def start(self) -> float:
@@ -56,23 +93,78 @@ class _Graded:
     def stop(self) -> float:
         raise NotImplementedError
 
+    @property
+    def open(self) -> bool:
+        """Whether the elements are still to be chosen."""
+        return is_open(self)
+
+    def _shares(self) -> Array:
+        """Ends of the elements, unless they are given, as parts of the whole from 0 to 1."""
+        return np.linspace(0.0, 1.0, self.elements + 1)
+
     def breakpoints(self) -> Array:
-        share = geometric_ends(self.elements, self.ratio)
-        ends = self.start + (self.stop - self.start) * share
+        if self.open:
+            return np.array([self.start, self.stop])
+        if self.ends is not None:
+            return np.array(self.ends)
+        ends = self.start + (self.stop - self.start) * self._shares()
         ends[-1] = self.stop
         return ends
 
+    def on_ends(self, ends: Sequence[float] | Array, accuracy: Asked | None = None, estimated: float | None = None) -> Self:
+        plain = {"ratio": 1.0} if hasattr(self, "ratio") else {}
+        places = tuple(float(s) for s in ends)
+        return replace(self, elements=None, ends=places, accuracy=accuracy, estimated=estimated, **plain)  # type: ignore[arg-type]
+
     def with_elements(self, elements: int) -> Self:
-        """Another number of elements whose ends are the same function of k/elements.
+        """Another number of elements whose ends are the same function of k/elements. Between given ``ends`` the function is linear.
 
         Parameters
         ----------
         elements : int
         """
-        return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
+        if self.ends is not None:
+            return self if elements == self.elements else self.on_ends(like(self.ends, elements))
+        return replace(self, elements=elements, accuracy=None)
 
     def refined(self) -> Self:
-        return self.with_elements(2 * self.elements)
+        """The same shape with every element divided in two.
+
+        Raises
+        ------
+        InputError
+            For a mesh whose elements are still to be chosen.
+        """
+        refuse_open(self)
+        return self.with_elements(2 * self.elements) if self.ends is None else self.on_ends(halved(self.breakpoints()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Graded(_Divided):
+    """An open curve, with elements in geometric progression unless their ends are given."""
+
+    ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ratio", check_ratio(self.ratio, "size of the last element over size of the first"))
+        for f in fields(self):
+            if f.name in _ENDS:
+                store(self, **{f.name: checked_end(f"mesh.{f.name}", getattr(self, f.name))})
+        super().__post_init__()
+
+    def _shares(self) -> Array:
+        return geometric_ends(self.elements, self.ratio)
+
+    def with_elements(self, elements: int) -> Self:
+        """Another number of elements whose ends are the same function of k/elements. Between given ``ends`` the function is linear.
+
+        Parameters
+        ----------
+        elements : int
+        """
+        if self.ends is not None or self.open:
+            return super().with_elements(elements)
+        return replace(self, elements=elements, ratio=graded_alike(self.elements, self.ratio, elements))
 
 
 #: fields that name supports
@@ -89,6 +181,13 @@ class Annulus(_Graded):
         Over R0, the outer radius; between 0 and 1.
     elements, ratio : int, float
         Number of elements, and the size of the outermost over the size of the innermost.
+    ends : sequence of float, optional
+        Ends of the elements along the meridian, over R0; in place of ``elements`` and ``ratio``.
+    accuracy : float, optional
+        Relative accuracy, 1e-12 to 0.1, for which a verb is to choose elements and degree; in place of all that says how long they are.
+        A number is asked of P and of the energy, a mapping of what it names (:class:`~.meridian.Accuracy`).
+    estimated : float, optional
+        The relative error that was estimated when the mesh was chosen. Such a mesh has ``accuracy`` and ``ends`` as well.
     inner, outer : str or mapping
         How the edges are held and, if not where they rest, where (``{"kind": "clamped", "radius": 1.2}``), see :mod:`.supports`; a
         ``hub`` is a rigid disc of the inner radius.
@@ -102,8 +201,7 @@ class Annulus(_Graded):
     inner: Held = "hub"
     outer: Held = "clamped"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _numbers(self) -> None:
         _convert(self, "inner_radius", above=0, below=1)
 
     @property
@@ -140,6 +238,8 @@ class Cap(_Graded):
         Height of the apex over the plane of the rim, in R0. A negative height makes a bowl, whose inside is above; 0 makes a flat disc.
     elements, ratio : int, float
         Number of elements, and the size of the element at the rim over the size of the element at the apex.
+    ends, accuracy, estimated
+        As for :class:`Annulus`.
     rim : str or mapping
         How the rim is held and, if not where it rests, where (``{"kind": "clamped", "radius": 1.2}``), see :mod:`.supports`.
 
@@ -151,8 +251,7 @@ class Cap(_Graded):
     height: float
     rim: Held = "clamped"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _numbers(self) -> None:
         _convert(self, "height", above=-1e3, below=1e3)
         if abs(self.height) < 1e-150:  # its radius of curvature has no number
             object.__setattr__(self, "height", 0.0)
@@ -194,6 +293,8 @@ class Sphere(_Graded):
     ----------
     elements, ratio : int, float
         Number of elements, and the size of the element at the lower pole over the size of the element at the upper pole.
+    ends, accuracy, estimated
+        As for :class:`Annulus`.
 
     Raises
     ------
@@ -228,6 +329,8 @@ class Cylinder(_Graded):
         Over R0, the radius.
     elements, ratio : int, float
         Number of elements, and the size of the lowest over the size of the topmost.
+    ends, accuracy, estimated
+        As for :class:`Annulus`.
     top, bottom : str or mapping
         How the ends are held and, if not where they rest, where, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
 
@@ -240,8 +343,7 @@ class Cylinder(_Graded):
     top: Held = "clamped"
     bottom: Held = "clamped"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _numbers(self) -> None:
         _convert(self, "length", above=1e-9, below=1e6)
 
     @property
@@ -263,7 +365,7 @@ class Cylinder(_Graded):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Torus:
+class Torus(_Divided):
     """Torus with a round tube of unit radius: R = aspect + sin s, Z = cos s, 0 <= s <= 2 pi, closed, from the top of the tube outwards.
 
     Parameters
@@ -271,7 +373,9 @@ class Torus:
     aspect : float
         Radius of the circle through the middle of the tube, over the radius R0 of the tube; > 1.
     elements : int
-        Number of elements around the tube, all equal; at least 3.
+        Number of elements around the tube, at least 3.
+    ends, accuracy, estimated
+        As for :class:`Annulus`.
 
     Raises
     ------
@@ -279,18 +383,19 @@ class Torus:
     """
 
     aspect: float
-    elements: int = ELEMENTS
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "elements", check_elements(self.elements, 3))
+    _least: ClassVar[int] = 3
+
+    def _numbers(self) -> None:
         _convert(self, "aspect", above=1, below=1e9)
 
     @property
     def shape(self) -> str:
         return "torus"
 
-    def breakpoints(self) -> Array:
-        return 2 * math.pi * np.linspace(0.0, 1.0, self.elements + 1)
+    @property
+    def stop(self) -> float:
+        return 2 * math.pi
 
     def position(self, s: Array) -> tuple[Array, Array]:
         return self.aspect + np.sin(s), np.cos(s)
@@ -298,23 +403,20 @@ class Torus:
     def tangent(self, s: Array) -> tuple[Array, Array]:
         return np.cos(s), -np.sin(s)
 
-    def with_elements(self, elements: int) -> Self:
-        """The same shape with another number of elements.
-
-        Parameters
-        ----------
-        elements : int
-        """
-        return replace(self, elements=elements)
-
-    def refined(self) -> Self:
-        return self.with_elements(2 * self.elements)
-
     def supports(self) -> tuple[()]:
         return ()
 
 
-def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, inner: Held = "hub", outer: Held = "clamped") -> Annulus:
+def annulus(
+    inner_radius: float,
+    elements: int | None = None,
+    ratio: float = 1.0,
+    inner: Held = "hub",
+    outer: Held = "clamped",
+    *,
+    ends: Sequence[float] | None = None,
+    accuracy: Asked | None = None,
+) -> Annulus:
     """Mesh of a flat ring.
 
     Parameters
@@ -326,6 +428,10 @@ def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, i
         Size of the outermost element over the size of the innermost.
     inner, outer : str or mapping
         How the edges are held, see :mod:`.supports`; a ``hub`` is a rigid disc of the inner radius.
+    ends : sequence of float, optional
+        Ends of the elements along the meridian, over R0; in place of ``elements`` and sizes.
+    accuracy : float, optional
+        Relative accuracy for which elements and degree are to be chosen; in place of all that says how long elements are.
 
     Returns
     -------
@@ -345,10 +451,18 @@ def annulus(inner_radius: float, elements: int = ELEMENTS, ratio: float = 1.0, i
     >>> round(fm.equilibrium(scene, pressure=0.0).center_height, 4)
     0.4152
     """
-    return Annulus(inner_radius=inner_radius, elements=elements, ratio=ratio, inner=inner, outer=outer)
+    return Annulus(inner_radius=inner_radius, elements=elements, ratio=ratio, inner=inner, outer=outer, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
-def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: Held = "clamped") -> Cap:
+def cap(
+    height: float,
+    elements: int | None = None,
+    ratio: float = 1.0,
+    rim: Held = "clamped",
+    *,
+    ends: Sequence[float] | None = None,
+    accuracy: Asked | None = None,
+) -> Cap:
     """Mesh of a spherical cap over a rim of unit radius.
 
     Parameters
@@ -360,6 +474,10 @@ def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: Held =
         Size of the element at the rim over the size of the element at the apex.
     rim : str or mapping
         How the rim is held, see :mod:`.supports`.
+    ends : sequence of float, optional
+        Ends of the elements along the meridian, over R0; in place of ``elements`` and sizes.
+    accuracy : float, optional
+        Relative accuracy for which elements and degree are to be chosen; in place of all that says how long elements are.
 
     Returns
     -------
@@ -378,10 +496,16 @@ def cap(height: float, elements: int = ELEMENTS, ratio: float = 1.0, rim: Held =
     >>> print(f"P = {eq.pressure:.4f}, apex at {eq.center_height:.4f}")
     P = 1.1348, apex at 0.7625
     """
-    return Cap(height=height, elements=elements, ratio=ratio, rim=rim)
+    return Cap(height=height, elements=elements, ratio=ratio, rim=rim, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
-def sphere(elements: int = ELEMENTS, ratio: float = 1.0) -> Sphere:
+def sphere(
+    elements: int | None = None,
+    ratio: float = 1.0,
+    *,
+    ends: Sequence[float] | None = None,
+    accuracy: Asked | None = None,
+) -> Sphere:
     """Mesh of a closed sphere of unit radius.
 
     Parameters
@@ -389,6 +513,10 @@ def sphere(elements: int = ELEMENTS, ratio: float = 1.0) -> Sphere:
     elements : int
     ratio : float
         Size of the element at the lower pole over the size of the element at the upper pole.
+    ends : sequence of float, optional
+        Ends of the elements along the meridian, over R0; in place of ``elements`` and sizes.
+    accuracy : float, optional
+        Relative accuracy for which elements and degree are to be chosen; in place of all that says how long elements are.
 
     Returns
     -------
@@ -409,15 +537,18 @@ def sphere(elements: int = ELEMENTS, ratio: float = 1.0) -> Sphere:
     >>> print(f"{fm.equilibrium(scene, volume=4 / 3 * pi * 1.2**3).pressure:.5f}, exact {2 * (1 / 1.2 - 1 / 1.2**7):.5f}")
     1.10850, exact 1.10850
     """
-    return Sphere(elements=elements, ratio=ratio)
+    return Sphere(elements=elements, ratio=ratio, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
 def cylinder(
     length: float,
-    elements: int = ELEMENTS,
+    elements: int | None = None,
     ratio: float = 1.0,
     top: Held = "clamped",
     bottom: Held = "clamped",
+    *,
+    ends: Sequence[float] | None = None,
+    accuracy: Asked | None = None,
 ) -> Cylinder:
     """Mesh of a tube of unit radius about the axis.
 
@@ -430,6 +561,10 @@ def cylinder(
         Size of the lowest element over the size of the topmost.
     top, bottom : str
         How the ends are held, see :mod:`.supports`; a ``hub`` is a rigid lid that moves along the axis.
+    ends : sequence of float, optional
+        Ends of the elements along the meridian, over R0; in place of ``elements`` and sizes.
+    accuracy : float, optional
+        Relative accuracy for which elements and degree are to be chosen; in place of all that says how long elements are.
 
     Returns
     -------
@@ -450,10 +585,10 @@ def cylinder(
     >>> print(f"P = {eq.pressure:.4f}, lid at {eq.center_height:.4f}")
     P = 0.5121, lid at 1.0387
     """
-    return Cylinder(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom)
+    return Cylinder(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
-def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
+def torus(aspect: float, elements: int | None = None, *, ends: Sequence[float] | None = None, accuracy: Asked | None = None) -> Torus:
     """Mesh of a torus with a round tube of unit radius.
 
     Parameters
@@ -461,7 +596,11 @@ def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
     aspect : float
         Radius of the circle through the middle of the tube, over the radius R0 of the tube; > 1.
     elements : int
-        Number of elements around the tube, all equal; at least 3.
+        Number of elements around the tube, at least 3; equal ones unless ``ends`` says otherwise.
+    ends : sequence of float, optional
+        Ends of the elements along the meridian, over R0; in place of ``elements`` and sizes.
+    accuracy : float, optional
+        Relative accuracy for which elements and degree are to be chosen; in place of all that says how long elements are.
 
     Returns
     -------
@@ -479,7 +618,7 @@ def torus(aspect: float, elements: int = ELEMENTS) -> Torus:
     >>> print(f"{fm.equilibrium(scene, pressure=0.3).volume:.3f}")
     70.871
     """
-    return Torus(aspect=aspect, elements=elements)
+    return Torus(aspect=aspect, elements=elements, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
 def _convert(mesh: Any, name: str, *, above: float, below: float) -> None:

@@ -9,6 +9,7 @@ evaluating and assembling are one matrix product each.
 
 from __future__ import annotations
 
+import copy
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any, cast
@@ -19,7 +20,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, shape_functions
+from .elements import lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -40,8 +41,12 @@ class Space(Numbering):
 
     Attributes
     ----------
+    nodal : bool
+        Whether all coefficients are values at :meth:`.Numbering.interpolation_points`, for degrees from 3 on too.
     table : ndarray, shape (4 n_quadrature, 2 (degree + 1))
         (u, u_x, w, w_x) at the quadrature points of an element from its coefficients.
+    reach : float
+        How far a component of the displacement may be from zero at quadrature points and nodes, over the largest of its coefficients.
     highest : ndarray, shape (n_quadrature,)
         The Legendre polynomial of the highest degree that the quadrature points of an element tell apart, at these.
     """
@@ -54,8 +59,10 @@ class Space(Numbering):
         anchored: frozenset[str] = frozenset(),
         ends: tuple[float, ...] = (),
         prestretch: float = 1.0,
+        nodal: bool = False,
     ) -> None:
         super().__init__(mesh, degree, quadrature, anchored, ends, prestretch)
+        self.nodal = nodal and degree > 2  # up to degree 2 the coefficients are values at the nodes anyway
         self._tabulate()
 
     def _tabulate(self) -> None:
@@ -65,6 +72,7 @@ class Space(Numbering):
         blocks = [[value, zero], [slope, zero], [zero, value], [zero, slope]]
         self.table = np.block(blocks)
         self._magnitudes = np.abs(self.table)
+        self.reach = max(1.0, float(np.abs(value).sum(axis=1).max()))
         rows = self.table.reshape(4, self.n_quadrature, -1)
         outer = []
         for i, j in HESSIAN_PAIRS:
@@ -82,9 +90,35 @@ class Space(Numbering):
         self._known_ends: dict[int, tuple[int, int, float, float]] = {}
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
+    def with_moved(self, places: tuple[tuple[int, float], ...]) -> Space:
+        """The same space with some ends of elements at other places along the meridian: the numbering stays.
+
+        Parameters
+        ----------
+        places : tuple of (int, float)
+            Numbers of ends and their places.
+        """
+        moved: Space = copy.copy(self)
+        for name in [name for name in vars(moved) if isinstance(getattr(type(moved), name, None), cached_property)]:
+            del moved.__dict__[name]
+        ends = self.ends.copy()
+        for k, s in places:
+            ends[k] = s
+        moved._place(ends)
+        moved._known_ends = {}
+        return moved
+
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
-        return shape_functions(self.degree, xi)
+        value, slope = shape_functions(self.degree, xi)
+        if not self.nodal:
+            return value, slope
+        at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
+        return value @ at_nodes, slope @ at_nodes
+
+    def second_derivatives(self, xi: Array) -> Array:
+        """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
+        return second_derivatives(self.degree, xi)
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
@@ -276,20 +310,22 @@ class Space(Numbering):
         ndarray, shape (n_elements - 1 + number of poles,)
             At the reference radii :attr:`kink_radii`.
         """
-        at_rest, slope, per_length, rest_kinks, poles = self._ends_of_elements
-        local = self.extend(x)[self.gather].reshape(2, self.degree + 1, -1)
-        y = np.empty(at_rest.shape, dtype=complex)
-        y.real, y.imag = slope @ local
+        at_rest, slopes, per_length, rest_kinks, poles = self._ends_of_elements
+        y = slopes @ self.extend(x).take(self.gather)
         y *= per_length
         y += at_rest
-        size = np.abs(y)
+        along, up = y[:2], y[2:]  # at both ends of each element
+        size = np.hypot(along, up)
+        size += 1e-300
         jumps = np.empty(rest_kinks.size)
         inner = self.n_elements - 1
-        np.divide(np.abs(y[1, :-1] - y[0, 1:]), np.minimum(size[1, :-1], size[0, 1:]) + 1e-300, out=jumps[:inner])
+        np.hypot(along[1, :-1] - along[0, 1:], up[1, :-1] - up[0, 1:], out=jumps[:inner])
+        jumps[:inner] /= np.minimum(size[1, :-1], size[0, 1:])
         for k in self.breaks:  # the stretch may jump there, and the direction not
-            jumps[k - 1] = abs(y[1, k - 1] / (size[1, k - 1] + 1e-300) - y[0, k] / (size[0, k] + 1e-300))
+            before, after = y[1::2, k - 1] / size[1, k - 1], y[::2, k] / size[0, k]
+            jumps[k - 1] = np.hypot(*(before - after))
         for k, end in enumerate(poles):
-            jumps[inner + k] = 2 * abs(y[end].imag) / (size[end] + 1e-300)
+            jumps[inner + k] = 2 * abs(up[end]) / size[end]
         jumps -= rest_kinks
         return jumps
 
@@ -300,8 +336,8 @@ class Space(Numbering):
 
     @cached_property
     def _ends_of_elements(self) -> tuple[Array, Array, Array, Array, list[tuple[int, int]]]:
-        """Complex tangents at both ends of each element at rest, slopes of the shape functions there, the factor that relates them to arc
-        length, the kinks at rest and which ends are poles."""
+        """Components along and up of the tangents at both ends of each element at rest, each of shape (2, n_elements), slopes of the shape
+        functions there, the factor that relates them to arc length, the kinks at rest and which ends are poles."""
         inside = 1e-9 * self.sizes  # the tangent of a curve with a corner has two values there
         R_s, Z_s = self.mesh.tangent(np.stack([self.ends[:-1] + inside, self.ends[1:] - inside]))
         length = np.hypot(R_s, Z_s)
@@ -312,7 +348,10 @@ class Space(Numbering):
         if self.lift is not None:
             _, u_s, _, w_s = self.lift.at(self.mesh, np.stack([self.ends[:-1], self.ends[1:]]))
             at_rest = at_rest + (u_s + 1j * w_s) / length
-        return at_rest, self.shape_functions(np.array([0.0, 1.0]))[1], 1 / (length * self.sizes), rest_kinks, poles
+        slope = self.shape_functions(np.array([0.0, 1.0]))[1]
+        none = np.zeros_like(slope)
+        slopes, per_length = np.block([[slope, none], [none, slope]]), np.tile(1 / (length * self.sizes), (2, 1))
+        return np.concatenate([at_rest.real, at_rest.imag]), slopes, per_length, rest_kinks, poles
 
     def recovered_slopes(self, x: Array, s: ArrayLike) -> tuple[Array, Array]:
         """(u_s, w_s) at parameters s; for low degrees continuous and one order better than the derivative of the solution.
@@ -354,15 +393,37 @@ class Space(Numbering):
 
 @lru_cache(maxsize=32)
 def space_of(
-    mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset(), ends: tuple[float, ...] = (), prestretch: float = 1.0
+    mesh: Meridian,
+    degree: int,
+    anchored: frozenset[str] = frozenset(),
+    ends: tuple[float, ...] = (),
+    prestretch: float = 1.0,
+    nodal: bool = False,
 ) -> Space:
     """The space of a mesh and a degree, built once."""
-    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch)
+    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch, nodal=nodal)
 
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch)
+    return moved_space_of(
+        scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies)
+    )
+
+
+@lru_cache(maxsize=32)
+def moved_space_of(
+    mesh: Meridian,
+    degree: int,
+    anchored: frozenset[str],
+    ends: tuple[float, ...],
+    prestretch: float,
+    borders: tuple[tuple[int, float], ...],
+    nodal: bool,
+) -> Space:
+    """The space of a mesh and a degree with some ends of elements elsewhere, see :meth:`Space.with_moved`."""
+    space = space_of(mesh, degree, anchored, ends, prestretch, nodal)
+    return space.with_moved(borders) if borders else space
 
 
 def anchored(scene: Any) -> frozenset[str]:

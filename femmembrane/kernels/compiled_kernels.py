@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .. import _native
 
 #: version of the interface, as the sources in ``compiled/`` state it; raised there and here when arguments or answers change
-INTERFACE = 4
+INTERFACE = 5
 
 
 class CompiledKernels:
@@ -92,7 +92,7 @@ class CompiledElements:
         self.native: _native.Elements = own
         self._n_free, self._n_points, self._depth = space.n_free, data.shape[1], 3 * space.half_bandwidth + 1
         self._shape = 4 * space.n_quadrature, space.n_elements
-        self.largest, self.force_scale = own.largest, own.force_scale
+        self.largest, self.force_scale, self.form_parts = own.largest, own.force_scale, own.form_parts
 
     def at_quadrature(self, x: Array) -> Array:
         local = np.empty(self._shape)

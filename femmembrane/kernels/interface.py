@@ -100,6 +100,17 @@ class Elements(Protocol):
     def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w, from the densities of an evaluation."""
 
+    def form_parts(self, densities: Array, x: Array, weights: Array) -> tuple[float, float]:
+        """Of the integrand of x . K x, K as assembled by :meth:`assemble`, at the quadrature points.
+
+        Returns
+        -------
+        weighed : float
+            Sum over the elements of the size of its sum with ``weights``, one for each quadrature point of an element.
+        terms : float
+            Sum of the sizes of all of its terms.
+        """
+
 
 @dataclass(frozen=True)
 class Rayleigh:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import blas, lapack
 from scipy.sparse.linalg import splu
 
-from ..discretization.space import Space
+from ..discretization.space import HESSIAN_PAIRS, Space
 from .bordered import BorderedFactor
 from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Array, Border, Pencil, PointFunction, Rayleigh, Step
 
@@ -85,6 +86,37 @@ class NumpyElements:
     def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
         density = np.abs(densities[:N_FORCE]).reshape(self._force_shape)
         return self.largest(self._space.assemble_magnitude(density[0] + abs(pressure) * density[1]))
+
+    def form_parts(self, densities: Array, x: Array, weights: Array) -> tuple[float, float]:
+        shape = self._space.s.shape
+        local = self._space.at_quadrature(x).reshape(4, *shape)
+        return form_parts(densities[N_FORCE : N_FORCE + N_STIFFNESS].reshape(-1, *shape), HESSIAN_PAIRS, local, weights)
+
+
+def form_parts(density: Array, pairs: tuple[tuple[int, int], ...], local: Array, weights: Array) -> tuple[float, float]:
+    """:meth:`.interface.Elements.form_parts` for local variables of any number.
+
+    Parameters
+    ----------
+    density : ndarray, shape (len(pairs), n_quadrature, n_elements)
+        Second derivatives with respect to pairs of local variables, times the weights of the integral.
+    pairs : tuple of (int, int)
+    local : ndarray, shape (n_variables, n_quadrature, n_elements)
+    weights : ndarray, shape (n_quadrature,)
+    """
+    first, second, times = _indices(pairs)
+    products = local.take(first, axis=0)
+    products *= local.take(second, axis=0)
+    products *= density
+    weighed = np.abs(weights @ np.tensordot(times, products, 1)).sum()
+    return float(weighed), float(times @ np.abs(products).sum(axis=(1, 2)))
+
+
+@lru_cache(maxsize=8)
+def _indices(pairs: tuple[tuple[int, int], ...]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """First and second of each pair, and how often it counts in a quadratic form."""
+    first, second = np.array(pairs).T
+    return first, second, np.where(first == second, 1.0, 2.0)
 
 
 class NumpyFactor:

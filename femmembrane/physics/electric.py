@@ -34,6 +34,31 @@ LOADS: Mapping[str, str] = {"voltage": "voltage", "total_charge": "total charge"
 
 
 @dataclass(frozen=True)
+class ElectricScales:
+    """Scales with the permittivity of a dielectric: they also convert :data:`~femmembrane.quantities.ELECTRIC_UNITS`.
+
+    Parameters
+    ----------
+    scales : Scales
+    electric : Mapping[str, float]
+        V, C, F and V/m of the unit of each of these kinds.
+    """
+
+    scales: Any
+    electric: Mapping[str, float]
+
+    def converts(self, quantity: str) -> bool:
+        """Whether a quantity is electric, or one of :class:`~femmembrane.Scales`."""
+        return quantity in self.electric or bool(self.scales.converts(quantity))
+
+    def to_si(self, quantity: str, value: Any) -> Any:
+        """A non-dimensional value in SI units; see :meth:`.Scales.to_si`."""
+        if quantity in self.electric:
+            return self.electric[quantity] * value
+        return self.scales.to_si(quantity, value)
+
+
+@dataclass(frozen=True)
 class Electric:
     """A voltage or a charge on the faces of a membrane.
 
@@ -167,12 +192,33 @@ class Electric:
         permittivity = epsilon_0 * float(self.relative_permittivity or 1.0)
         strength = math.sqrt(scales.shear_modulus / permittivity)
         density = math.sqrt(scales.shear_modulus * permittivity)
-        return {
+        units = {
             "voltage": strength * scales.thickness,
-            "total_charge": density * scales.radius**2,
+            "total_charge": density * scales.radius * scales.radius,
             "frozen_charge": density,
             "breakdown": strength,
         }
+        for name, unit in units.items():
+            if not 0 < unit < math.inf:
+                advice = f"the unit of electric.{name} would be {unit:g}; radius and thickness in m and shear_modulus in Pa are allowed"
+                raise InputError("scales", scales, advice)
+        return units
+
+    def converter(self, scales: Any) -> Any:
+        """What turns numbers of a scene into SI units; None without scales.
+
+        Parameters
+        ----------
+        scales : Scales or None
+            Those of the scene; volts need a ``relative_permittivity`` as well.
+        """
+        if scales is None or self.relative_permittivity is None:
+            return scales
+        units = self.units(scales)
+        voltage, charge = units["voltage"], units["total_charge"]
+        return ElectricScales(
+            scales, {"voltage": voltage, "charge": charge, "capacitance": charge / voltage, "electric_field": units["breakdown"]}
+        )
 
     def plain(self, scales: Any) -> Electric:
         """The same as numbers without units.

@@ -59,7 +59,7 @@ class Electrified:
         return s11 + both, s12 + both, s22 + both
 
     def mechanical_stress(self, e1: Any, e2: Any) -> tuple[Any, Any]:
-        """Stresses of the material alone."""
+        """Cauchy stresses of the material alone."""
         return self.material.stress(e1, e2)
 
     def field_squared(self, e1: Any, e2: Any) -> Any:

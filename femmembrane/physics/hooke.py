@@ -12,12 +12,15 @@ lambda_1 lambda_2 lambda_3. In simple tension E_2 = E_3 = -nu E_1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..checks import number, store
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .electrified_hooke import ElectrifiedHooke
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,18 @@ class Hooke:
         """
         E1, E2, coupling, inside = self._at(e1, e2)
         return inside * np.exp(e1 + e2) * np.sqrt(np.fabs(1 - 2 * coupling * (E1 + E2)))
+
+    def electrified(self, voltage: Any, charge: Any) -> ElectrifiedHooke:
+        """Its response under a field, which presses it thin.
+
+        Parameters
+        ----------
+        voltage, charge : float, ndarray or CasADi symbol
+            As in :class:`~.electrified.Electrified`.
+        """
+        from .electrified_hooke import ElectrifiedHooke
+
+        return ElectrifiedHooke(self, voltage, charge)
 
     def _at(self, e1: Any, e2: Any) -> tuple[Any, Any, Any, Any]:
         """Green strains, nu/(1 - nu), and 1 where the sheet has a thickness, else NaN."""

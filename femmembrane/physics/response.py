@@ -6,6 +6,7 @@ modulus, whose stresses are the effective ones: those that the Legendre-Hadamard
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ def response_of(scene: Any, square: Any = None) -> Material:
     if scene.electricity is None:
         return TensionField(material) if scene.tension_field else material
     charge = scene.electricity.frozen_charge is not None
-    electrified = Electrified(material, 0.0 if charge else square, square if charge else 0.0)
+    own = getattr(material, "electrified", None)  # of a compressible material, whose thickness the field changes
+    electrified = (own or partial(Electrified, material))(0.0 if charge else square, square if charge else 0.0)
     return ElectricTensionField(electrified) if scene.tension_field else electrified
 
 

@@ -203,6 +203,15 @@ class Scales:
             ratio = given / self._unit(quantity)
             return _converted(value, given, ratio * ratio if quantity in SQUARED else ratio)
 
+    def converts(self, quantity: str) -> bool:
+        """Whether a quantity is one of the table of this module.
+
+        Parameters
+        ----------
+        quantity : str
+        """
+        return quantity in SI_UNITS
+
     def fits(self, sources: Iterable[Any]) -> bool:
         """Whether one of the sources has the moment ``dipole_moment``, to 1e-9 of its strength; true where no moment is given.
 

@@ -59,6 +59,8 @@ class Family(Potential):
         The parts of the member at a value of the number, a CasADi symbol here: an object with the attributes of a scene.
     scene_at : callable, optional
         The member itself, a checked scene, for whoever asks for the potential of one.
+    even : bool
+        Whether a number and its negative are the same scene.
     """
 
     @BUILDING
@@ -69,8 +71,10 @@ class Family(Potential):
         quadrature: int | None = None,
         *,
         scene_at: Callable[[float], Scene] | None = None,
+        even: bool = False,
     ) -> None:
         require_elements(scene)
+        self.even = even
         self._scene_at = scene_at or (lambda number: scene)
         self._members: dict[float, Member] = {}
         number = ca.SX.sym("number")
@@ -183,8 +187,9 @@ class Family(Potential):
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
         if self.charged is not None:
-            allowed = "a voltage is allowed, whose folds are local: a total charge couples all points of the membrane"
-            raise InputError("electric.total_charge", self.charged.total, allowed)
+            return FoldDerivatives(
+                *self.charged.fold_derivatives(x, pressure, number, mode, q), self.number_derivative(x, pressure, number)
+            )
         space, ne = self.space, self.space.n_elements
         local = np.concatenate([space.at_quadrature(x), space.at_quadrature(mode)])
         out = self._fold_kernel(local, np.array([pressure, number, q]))

@@ -74,7 +74,7 @@ class Numbered(Potential):
     def __init__(self, numbers: Numbers) -> None:
         scene = numbers.scene
         require_elements(scene)
-        self.numbers = numbers
+        self.numbers, self.values = numbers, numbers.values
         own = [ca.SX.sym("number") for _ in numbers.names]
         with casadi_answers_numpy():
             member = numbers.vary(own)
@@ -84,7 +84,7 @@ class Numbered(Potential):
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         self.magnetisation = Magnetisation.of(scene) if scene.sources else None
         data, local, parameters = self.symbols
-        self._own, self._given = ca.vertcat(*own), parameters
+        self._own, self._given = ca.vertcat(ca.SX(0, 1), *own), parameters
         self.symbols = data, local, ca.vertcat(parameters, *own)
 
     def at(self, values: Sequence[float]) -> NumberedMember:
@@ -104,7 +104,17 @@ class Numbered(Potential):
         k = self._mover
         return 0.0 if self._way is None or k is None else self._way.unit.axial[0] * (values[k] - self._way.at)
 
-    @property
+    def lift_at(self, s: Array, values: Sequence[float]) -> tuple[Array, Array, int] | None:
+        """(u, u_s, w, w_s) at parameters s that the number which moves an end adds to those of the space; their rates, shape (4, n), and
+        which number that is. None without one.
+        """
+        k = self._mover
+        if self._way is None or k is None:
+            return None
+        unit = self._way.unit.at(self.space.mesh, s)
+        return (values[k] - self._way.at) * unit, unit, k
+
+    @cached_property
     def _mover(self) -> int | None:
         """Which number moves an end of the membrane; None where none does."""
         return next((k for k, parameter in enumerate(self.numbers.parameters) if parameter.moves), None)
@@ -145,8 +155,10 @@ class Numbered(Potential):
         values : sequence of float, optional
             Of the numbers; default: those of the scene.
         """
-        values = self.numbers.values if values is None else values
+        values = self.values if values is None else values
         count, space = len(self.numbers.names), self.space
+        if not count:
+            return NumberDerivatives(np.zeros((space.n_free, 0)), np.zeros(0), np.zeros(0))
         out = self._number_kernel(space.at_quadrature(x), self._parameters(x, pressure, values))
         out = out.reshape(count, -1, self.n_points)
         force = np.stack([space.assemble_vector(rows[:4].reshape(-1, space.n_elements)) for rows in out], axis=1)
@@ -176,7 +188,7 @@ class Numbered(Potential):
     def energy_derivatives(self, x: Array, pressure: float) -> dict[str, tuple[Array, Array]]:
         """Derivatives of each energy with respect to x and to the numbers of the scene, without a total charge."""
         count, space, found = len(self.numbers.names), self.space, {}
-        out = self._energy_kernel(space.at_quadrature(x), self._parameters(x, pressure, self.numbers.values))
+        out = self._energy_kernel(space.at_quadrature(x), self._parameters(x, pressure, self.values))
         known = [name for name in ENERGIES if name in self.terms]
         for name, rows in zip(known, out.reshape(len(known), 4 + count, -1), strict=True):
             found[name] = space.assemble_vector(rows[:4].reshape(-1, space.n_elements)), rows[4:].sum(axis=1)
@@ -196,7 +208,7 @@ class Numbered(Potential):
         """Third derivatives contracted twice with a mode (v, q), at the numbers of the scene, without a total charge."""
         space = self.space
         local = np.concatenate([space.at_quadrature(x), space.at_quadrature(mode)])
-        out = self._form_kernel(local, np.append(self._parameters(x, pressure, self.numbers.values), q))
+        out = self._form_kernel(local, np.append(self._parameters(x, pressure, self.values), q))
         return FormDerivatives(
             space.assemble_vector(out[:4].reshape(-1, space.n_elements)), float(out[4].sum()), np.asarray(out[5:].sum(axis=1))
         )

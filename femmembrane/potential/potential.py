@@ -38,6 +38,7 @@ from .template import expressions_of
 if TYPE_CHECKING:
     from ..physics.electric import Electric
     from ..physics.materials import Material
+    from ..physics.obstacles import Obstacle
     from ..scene import Scene
 
 
@@ -139,6 +140,34 @@ class Evaluation:
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
 
+    def carried(self, v: Array) -> Array:
+        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
+        return v
+
+    def brought(self, v: Array) -> Array:
+        """A displacement on the mesh of the scene here, with what may stand behind it."""
+        return v
+
+    def row(self, row: Array) -> Array:
+        """A linear form of :meth:`carried` displacements as one of displacements here."""
+        return row
+
+    def holds(self, unknown: int) -> bool:
+        """Whether a body keeps an unknown from changing."""
+        return False
+
+    def reduced(self, v: Array) -> Array:
+        """A vector, or columns, in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
+        return v
+
+    def expanded(self, v: Array) -> Array:
+        """The displacement of a vector in the unknowns of :attr:`band`."""
+        return v
+
+    def reduced_mass(self, mass: Array) -> Array:
+        """A mass matrix in the unknowns of :attr:`band`."""
+        return mass
+
     def inner(self, x: Array, y: Array) -> float:
         """x . (E'' - P V'') y."""
         own = kernels().inner(self.band, self.potential.space.half_bandwidth, x, y)
@@ -161,6 +190,12 @@ class Evaluation:
     def force_scale(self, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
         return self.elements.force_scale(self._densities, pressure)
+
+    def form_parts(self, mode: Array) -> tuple[float, float]:
+        """Of the integrand of mode . (E'' - P V'') mode, less what the :attr:`spring` adds: see :meth:`.Elements.form_parts`. The weights
+        are those of the highest polynomial that the quadrature points of an element tell apart.
+        """
+        return self.elements.form_parts(self._densities, np.ascontiguousarray(mode), self.potential.space.highest)
 
     @property
     def load_energy(self) -> float:
@@ -192,16 +227,26 @@ class Potential:
         Whether the membrane without load is flat and without stress, so that nothing but a load gives it stiffness across its plane.
     """
 
+    #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
+    obstacles: tuple[Obstacle, ...] = ()
+    unsettled = False
+    #: a potential with the same expressions on other points
+    _like: Potential | None = None
+    symbols: tuple[ca.SX, ca.SX, ca.SX]
+    terms: dict[str, ca.SX]
+
     @BUILDING
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        ends, stretch = scene.element_ends, scene.prestretch
+        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "bodies", ()))
         self.space = (
-            space_of(scene.mesh, scene.degree, fixed, ends, stretch)
+            space_of(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
             if quadrature is None
-            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch)
+            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch, nodal)
         )
+        if borders := getattr(scene, "borders", ()):
+            self.space = self.space.with_moved(borders)
         space = self.space
         self.sheet = Sheet.of(scene)
         if not space.n_free:
@@ -239,15 +284,28 @@ class Potential:
             if lift is not None:
                 columns |= {name: part for name, part in zip(names, space.lifting_of(lift), strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
-        with casadi_answers_numpy():
-            given = scene, self.sources, self.loads, tuple(columns), space, forces
-            self.symbols, self.terms = expressions_of(point_expressions, *given)
+        if (like := self._like) is not None:
+            self.symbols, self.terms = like.symbols, like.terms
+            self.__dict__["point_function"] = like.point_function
+        else:
+            with casadi_answers_numpy():
+                given = scene, self.sources, self.loads, tuple(columns), space, forces
+                self.symbols, self.terms = expressions_of(point_expressions, *given)
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
+
+    def placed(self, x: Array) -> Array:
+        """A state with the nodes that bodies hold moved onto them."""
+        return x
 
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
         return 0.0
+
+    @property
+    def root(self) -> Potential:
+        """The potential on the mesh of the scene: this one, unless ends of elements follow borders of contact."""
+        return self
 
     @property
     def surrounded(self) -> bool:
@@ -312,6 +370,17 @@ class Potential:
         return float(self.bulk.sum())
 
     @cached_property
+    def arc_band(self) -> Array:
+        """The inner product of (x, P), which is the same on every mesh: mean over the reference area of the displacements plus P Q, both in
+        units of the membrane's own size. In band storage, shape (3 kd + 1, n_free + 1).
+        """
+        square = self.space.unit**2
+        band = np.zeros((self.space.n_free + 1, len(self.mass)))
+        band[:-1] = self.mass.T / (self.area * square)
+        band[-1, 2 * self.space.half_bandwidth] = square
+        return band.T
+
+    @cached_property
     def rigid(self) -> Array | None:
         """Where the membrane can move along the axis as a whole: the mass times that motion, of mass one, shape (n_free, 1)."""
         space = self.space
@@ -351,7 +420,7 @@ class Potential:
 
     @cached_property
     def _point(self) -> PointProgram:
-        return PointProgram(self.point_function, self.point_data)
+        return PointProgram(self.point_function, self.point_data, None if self._like is None else self._like._point)
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
@@ -406,15 +475,12 @@ class Potential:
         names = ("voltage", "charge", "capacitance", "electric_field")
         if self.electric is None:
             return dict.fromkeys(names, 0.0)
-        space, sheet = self.space, self.sheet
-        thickness = 1.0 if sheet is None else sheet.factors(space.R, space.Z, space.s)[0]
-        square = self._field_squared(x)
-        largest = float(np.sqrt(square.max()))
+        space, largest = self.space, self.largest_field(x)
         if self.electric.frozen_charge is not None:
             covered = float((space.area_weights * self.electric.covers(space.s)).sum())
             return dict(zip(names, (np.nan, self.electric.frozen_charge * covered, np.nan, largest), strict=True))
         phi = math.sqrt(self.square(x) or 0.0)
-        capacitance = float((space.area_weights * thickness * square).sum()) / phi**2
+        capacitance = 2 * abs(self.electric_energy(x)) / phi**2
         return dict(zip(names, (phi, phi * capacitance, capacitance, largest), strict=True))
 
     @cached_property
@@ -557,11 +623,18 @@ def potential_of(scene: Scene) -> Potential:
         While the mesh of the scene is still to be chosen.
     """
     require_elements(scene)
+    return _potential_of(_plain(scene))
+
+
+@lru_cache(maxsize=256)
+def _plain(scene: Scene) -> Scene:
+    """The scene without what makes no difference to its potential."""
     electric = scene.electricity
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
-    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
-    return _potential_of(scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain))
+    ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
+    plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
+    return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
 
 
 def require_elements(scene: Scene) -> None:
@@ -573,4 +646,8 @@ def require_elements(scene: Scene) -> None:
 
 @lru_cache(maxsize=64)
 def _potential_of(scene: Scene) -> Potential:
-    return Potential(scene)
+    if not scene.bodies:
+        return Potential(scene)
+    from .contact import ContactPotential
+
+    return ContactPotential(scene)

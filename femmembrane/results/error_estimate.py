@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..quantities import words
+from ..quantities import PLACES, words
 from ..solve.controls import CONTROLS, control_kind
 from . import door
 
@@ -55,6 +55,10 @@ class ErrorEstimate:
         ``energy`` is elastic, magnetic and load energy together.
     lambda_pressure, lambda_volume : Deviation
         Smallest eigenvalues of the second variation under pressure and volume control.
+    displacement : Deviation
+        Root mean square over the reference area of the displacement, and of its error, over R0.
+    stress_first, stress_last : Deviation
+        Meridional Cauchy stress at the first end (the pole of a disc) and at the last (its rim), over mu.
     method : str
         What was compared.
     reason : str
@@ -70,6 +74,9 @@ class ErrorEstimate:
     energy: Deviation
     lambda_pressure: Deviation
     lambda_volume: Deviation
+    displacement: Deviation
+    stress_first: Deviation
+    stress_last: Deviation
     method: str
     reason: str = ""
 
@@ -85,12 +92,48 @@ class ErrorEstimate:
         return "\n".join(lines + ([self.reason] if self.reason else []))
 
 
+@dataclass(frozen=True)
+class PlaceEstimate:
+    """Estimated discretisation errors of the place of a special point.
+
+    Attributes
+    ----------
+    pressure, volume, center_height : Deviation
+    method : str
+        What was compared.
+    reason : str
+        Why errors are NaN; empty when there is an estimate.
+    """
+
+    pressure: Deviation
+    volume: Deviation
+    center_height: Deviation
+    method: str
+    reason: str = ""
+
+    def __str__(self) -> str:
+        lines = [self.method, f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
+        for name in PLACES:
+            d: Deviation = getattr(self, name)
+            lines.append(f"{words(name):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
+        return "\n".join(lines + ([self.reason] if self.reason else []))
+
+
+def place_from_numbers(values: Mapping[str, float], better: Mapping[str, float] | None, method: str, reason: str) -> PlaceEstimate:
+    """The record of values and of those of a finer space, by name; None: without an estimate."""
+    errors = dict.fromkeys(values, np.nan) if better is None else {name: value - better[name] for name, value in values.items()}
+    return PlaceEstimate(
+        **{name: Deviation(values[name], errors[name], abs(values[name])) for name in PLACES}, method=method, reason=reason
+    )
+
+
 #: the quantities of an estimate, in its order
 ESTIMATED = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
 
 
 def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
     """The record of values and errors by name."""
+    values, errors = ({name: numbers.get(name, np.nan) for name in ESTIMATED} for numbers in (values, errors))  # older files have fewer
     scales = {name: abs(value) for name, value in values.items()}
     scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
     parts = {name: Deviation(values[name], errors[name], scales[name]) for name in ESTIMATED}

@@ -32,6 +32,11 @@ def percent(part: float) -> str:
     return f"{100 * part:.0f} %" if part >= 0.995 else f"{100 * part:.2g} %"
 
 
+def _digits(value: float) -> str:
+    """A number with five digits, and no power of ten where it is large."""
+    return f"{float(f'{value:.5g}'):.12g}"
+
+
 @dataclass(frozen=True)
 class Correlation(Mapping[str, Mapping[str, float]]):
     """Correlations by name: ``correlation["a", "b"]``, or ``correlation["a"]["b"]``.
@@ -194,7 +199,7 @@ class Fit:
             value, error, (low, high) = self.values[name], self.standard_errors[name], self.intervals[name]
             part = percent(error / abs(value)) if error < 10 * abs(value) else "-"
             unit = f" {self.units[name]}" if self.units[name] else ""
-            lines.append(f"{name:<{width}} {value:>12.6g} {part:>8}  {low:.6g} to {high:.6g}{unit}")
+            lines.append(f"{name:<{width}} {value:>12.6g} {part:>8}  {_digits(low)} to {_digits(high)}{unit}")
         lines.append(self.verdict)
         return "\n".join([*lines, *self.notes])
 

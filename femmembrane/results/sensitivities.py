@@ -15,16 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, SolveError, Status, unknown_name
 from ..quantities import PROFILE, quantity
 from ..scene.run import GAS, PRESCRIBED
-from ..scene.variation import Parameter
+from ..scene.variation import Scale
 from ..solve.controls import CONTROLS, Control
 from ..solve.sensitivity import FOLDS, Rates, Sensitive, differentiated, sensitive
 from ..solve.state import inner
 from . import door
 
 if TYPE_CHECKING:
+    from ..potential import Potential
     from ..scene import Scene
     from .branch import Branch
     from .equilibrium import Equilibrium
@@ -59,16 +60,25 @@ class Along:
 class _Derived:
     """One equilibrium that moves with numbers of its scene."""
 
-    def __init__(self, eq: Equilibrium, known: Sensitive, rates: Rates, along: Along) -> None:
-        self.eq, self.known, self.rates, self.along = eq, known, rates, along
-        self.potential = eq.potential
+    def __init__(self, eq: Equilibrium, potential: Potential, known: Sensitive, rates: Rates, along: Along) -> None:
+        self.eq, self.potential, self.known, self.rates, self.along = eq, potential, known, rates, along
         self._profiles: list[dict[str, Array]] | None = None
 
     def of(self, name: str) -> list[Answer]:
         """Derivatives of a quantity with respect to all numbers."""
         plain, factor = self._plain(name)
         found = self._of(plain)
-        return found if factor == 1.0 else [value * factor for value in found]
+        if plain == name:
+            return found
+        kind, value = quantity(plain).si, self._value(plain)
+        powers = [p.power(kind) / p.value if isinstance(p, Scale) else 0.0 for p in self.known.parameters]
+        return [factor * (rate + power * value) for rate, power in zip(found, powers, strict=True)]
+
+    def _value(self, name: str) -> Answer:
+        """The quantity itself."""
+        if name not in _PROFILE:
+            return float(getattr(self.eq, name))
+        return self.eq.profile(self.along.r)[name]
 
     def _plain(self, name: str) -> tuple[str, float]:
         """The quantity without SI units, and what its derivative is multiplied by."""
@@ -103,7 +113,7 @@ class _Derived:
         if gas is None:
             raise InputError("of", "gas_amount", "no gas holds this equilibrium; a scene with chamber=fm.Chamber(volume=...) has one")
         total, absolute = self.eq.volume + gas.chamber, self.eq.pressure + gas.atmosphere
-        own = np.array([{"chamber.volume": absolute, "chamber.atmosphere": total}.get(name, 0.0) for name in self.known.names])
+        own = absolute * self.known.through("chamber.volume") + total * self.known.through("chamber.atmosphere")
         amount: Array = self.rates.pressure * total + absolute * self.rates.volume + own
         return amount
 
@@ -163,27 +173,28 @@ def _energy(moved: tuple[Scene, Array, float], name: str) -> float:
 
 def sensitivity_of(eq: Equilibrium, of: Any, to: Any, held: str | None, along: Along) -> Any:
     """See :meth:`.Equilibrium.sensitivity`."""
-    numbers, quantities = checked_to(eq.scene, to), _listed("of", of)
-    known = sensitive(eq.scene, numbers)
-    control = _control(eq, held)
-    evaluation = eq.potential.evaluate(eq.state, eq.pressure)
+    quantities, known = _listed("of", of), _known(eq.scene, to)
+    if eq.status is Status.INTERPOLATED:
+        raise SolveError("an interpolated state is in no exact balance, and has no exact derivatives", status=Status.INTERPOLATED)
+    potential, control = eq.potential, _control(eq, held)
+    evaluation = potential.evaluate(eq.state, eq.pressure)
     rates = known.at_control(evaluation, eq.pressure, control)
-    return _shaped(_Derived(eq, known, rates, along), quantities, of, to)
+    return _shaped(_Derived(eq, potential, known, rates, along), quantities, of, to)
 
 
 def sensitivity_of_point(point: SpecialPoint, of: Any, to: Any, along: Along) -> Any:
     """See :meth:`.SpecialPoint.sensitivity`."""
     eq = point.equilibrium
-    numbers, quantities = checked_to(eq.scene, to), _listed("of", of)
+    quantities, known = _listed("of", of), _known(eq.scene, to)
     if point.kind not in FOLDS:
         allowed = f"a {' or a '.join(kind.replace('_', ' ') for kind in FOLDS)} is allowed: others have no equation that is followed here"
         raise InputError("point.kind", point.kind, allowed)
-    known = sensitive(eq.scene, numbers)
-    evaluation = eq.potential.evaluate(eq.state, eq.pressure)
+    potential = eq.potential
+    evaluation = potential.evaluate(eq.state, eq.pressure)
     if evaluation.spring is not None:
         raise InputError("electric.total_charge", eq.charge, "a voltage is allowed at a fold: a total charge couples all points")
     rates = known.at_fold(evaluation, eq.pressure, point.kind)
-    return _shaped(_Derived(eq, known, rates, along), quantities, of, to)
+    return _shaped(_Derived(eq, potential, known, rates, along), quantities, of, to)
 
 
 def sensitivity_along(branch: Branch, of: Any, to: Any, held: str | None, along: Along) -> Any:
@@ -233,21 +244,14 @@ def _listed(key: str, given: Any) -> tuple[str, ...]:
     return tuple(dict.fromkeys(given))
 
 
-def checked_to(scene: Scene, to: Any) -> tuple[str, ...]:
-    """Names of numbers that a scene has.
-
-    Raises
-    ------
-    InputError
-        For a name that it does not have, or of a number that is not continuous.
-    """
-    wanted = _listed("to", to)
-    for name in wanted:
-        try:
-            Parameter(scene, name)
-        except InputError as error:
-            raise InputError("to", name, error.allowed) from None
-    return wanted
+def _known(scene: Scene, to: Any) -> Sensitive:
+    """The derivatives of the equations of a scene with respect to numbers that it has."""
+    try:
+        return sensitive(scene, _listed("to", to))
+    except InputError as error:
+        if error.key != "parameter":
+            raise
+        raise InputError("to", error.value, error.allowed) from None
 
 
 def _control(eq: Equilibrium, held: str | None) -> Control:

@@ -157,7 +157,9 @@ def _profile_variables(branch: Branch) -> dict[str, Variable]:
     if not profiles:
         return {}
     places = [key for key in ("r", "s") if key in profiles[0]]
-    values = {key: (("step", "node"), np.array([p[key] for p in profiles])) for key in profiles[0] if key not in places}
+    table = columns(branch)  # the largest electric field has the name of the field, of which there is a value at each node as well
+    names = {key: f"{key}_profile" if key in table else key for key in profiles[0] if key not in places}
+    values = {name: (("step", "node"), np.array([p[key] for p in profiles])) for key, name in names.items()}
     return {**{key: (("node",), np.array(profiles[0][key])) for key in places}, **values}
 
 

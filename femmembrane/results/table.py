@@ -33,8 +33,8 @@ def columns(branch: Branch) -> list[str]:
     """Names of the columns of a branch, in the order of ``branch.csv``.
 
     Behind the step stands the number of the scene that changes along the branch, if one does. Between those that every branch has stand
-    ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, those of :func:`electric_columns`, and the columns of
-    the analyses that the scene asks for.
+    ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, ``electric_energy`` when it has
+    electrodes, and the columns of the analyses that the scene asks for.
     """
     scene = branch.scene
     return [
@@ -43,20 +43,11 @@ def columns(branch: Branch) -> list[str]:
         *("volume", "pressure", "center_height", "elastic_energy"),
         *(["magnetic_energy"] if scene.sources else []),
         *(["load_energy"] if scene.loads else []),
-        *electric_columns(scene),
+        *(["electric_energy"] if scene.electric else []),
         *(["gas"] if scene.chamber else []),
         *(name for analysis in asked(scene) for name in analysis.columns(scene)),
         *_LAST,
     ]
-
-
-def electric_columns(scene: Scene) -> list[str]:
-    """What a scene with voltage or charge has besides; the ratio to the breakdown field where it is given."""
-    electric = scene.electric
-    if electric is None:
-        return []
-    one = [] if electric.frozen_charge is not None else ["voltage", "capacitance"]
-    return ["electric_energy", *one, "charge", "electric_field", *([] if electric.breakdown is None else ["breakdown_ratio"])]
 
 
 def reader(scene: Scene, column: str) -> Callable[[int, Equilibrium], Cell]:
@@ -117,7 +108,7 @@ def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
     """One row for each special point of the branch, in the order of :func:`special_point_columns`."""
     values = [
         *(partial(_attribute, name=name) for name in _located_by(branch)),
-        *(partial(analysis.point_value, column=name) for analysis, name in _of_points(branch.scene)),
+        *(partial(analysis.point_value, column=name) for analysis, name in _of_points(branch)),
     ]
     for point in branch.special_points or ():
         yield [value(point) for value in values]
@@ -132,14 +123,15 @@ def _attribute(point: SpecialPoint, name: str) -> Any:
     return point.equilibrium.number(name) if "." in name else getattr(point, name)
 
 
-def _of_points(scene: Scene) -> list[tuple[EquilibriumAnalysis, str]]:
-    return [(analysis, name) for analysis in asked(scene) for name in analysis.point_columns(scene)]
+def _of_points(branch: Branch) -> list[tuple[EquilibriumAnalysis, str]]:
+    scene, points = branch.scene, branch.special_points or ()
+    return [(each, name) for each in asked(scene) for name in (*each.point_columns(scene), *each.found_columns(points))]
 
 
 def special_point_columns(branch: Branch) -> list[str]:
     """Columns of ``special_points.csv``: kind, a number that changes along the branch, volume, pressure, center_height, error, and those of
     the analyses of the scene."""
-    return [*_located_by(branch), *(name for _, name in _of_points(branch.scene))]
+    return [*_located_by(branch), *(name for _, name in _of_points(branch))]
 
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:

@@ -41,7 +41,15 @@ _KINDS: Mapping[str, Mapping[str, str]] = {
     "load": {"weight": "weight", "gamma": "gamma", "force": "force"},
     "chamber": {"volume": "volume", "atmosphere": "pressure"},
     "electric": {"voltage": "V", "total_charge": "C", "frozen_charge": "C/m^2", "breakdown": "V/m", "from": "length", "to": "length"},
-    "mesh": {"radii": "length", "points": "length", "inner_radius": "length", "height": "length", "length": "length", "radius": "length"},
+    "mesh": {
+        "radii": "length",
+        "ends": "length",
+        "points": "length",
+        "inner_radius": "length",
+        "height": "length",
+        "length": "length",
+        "radius": "length",
+    },
 }
 #: what may stand for the strength of a source, the one without a unit first
 _STRENGTHS: Mapping[str, tuple[str, ...]] = {

@@ -165,6 +165,9 @@ class NumberProblem(CurveProblem[NumberPoint]):
         size = np.sqrt(v @ weighed + q * q)
         return weighed / size, q / float(size)
 
+    def mirrored(self, point: NumberPoint) -> bool:
+        return self.family.even and point.number == 0
+
     def predict(self, path: Predictor, point: NumberPoint, step: float) -> tuple[float, Array, Array]:
         guess = path.predict(point.sigma + step)
         low, high = self.bounds

@@ -17,17 +17,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, SolveError, Status
 from ..kernels.interface import Border
-from ..potential import Array, Evaluation, Numbered
+from ..potential import Array, Evaluation, NumberDerivatives, Numbered
 from ..scene import Scene
-from ..scene.variation import Numbers, Parameter
-from .banded import BandFactor, BorderedFactor
-from .controls import CONTROLS, Control, GasOver
+from ..scene.variation import Numbers, Scale, parameter_of
+from .banded import BandFactor
+from .controls import CONTROLS, Control, Gas, GasOver
 from .state import inner
 
 #: movement for a change of what is held by its unit, in units of the membrane, from which on the state is at a fold of it
@@ -69,21 +68,22 @@ class Sensitive:
 
     def __init__(self, scene: Scene, names: Sequence[str]) -> None:
         self.scene, self.names = scene, tuple(names)
-        self.parameters = tuple(Parameter(scene, name) for name in self.names)
-        rates = [parameter.rates() for parameter in self.parameters]
+        self.parameters = tuple(parameter_of(scene, name) for name in self.names)
+        self._rates = rates = [parameter.rates() for parameter in self.parameters]
         own = list(dict.fromkeys(name for rate in rates for name in rate))
-        movers = [name for name in own if Parameter.moves.fget(_named(scene, name))]  # type: ignore[attr-defined]
+        movers = [parameter.name for parameter in Numbers(scene, tuple(own)).parameters if parameter.moves]
         # the places of two ends have no expression in common
         groups = [[name for name in own if name not in movers[1:]], *([name] for name in movers[1:])]
         self._groups = [(Numbered(Numbers(scene, tuple(group))), _mixed(rates, group)) for group in groups]
 
-    def equations(self, x: Array, pressure: float) -> tuple[Array, Array, Array]:
+    def equations(self, x: Array, pressure: float) -> NumberDerivatives:
         """Derivatives of E' - P V', of the volume and of the height of the pole at fixed (x, P)."""
-        force, volume, height = np.zeros((len(x), len(self.names))), np.zeros(len(self.names)), np.zeros(len(self.names))
-        for numbered, mix in self._groups:
-            found = numbered.derivatives(x, pressure)
-            force, volume, height = force + found.force @ mix, volume + found.volume @ mix, height + found.height @ mix
-        return force, volume, height
+        parts = [(numbered.derivatives(x, pressure), mix) for numbered, mix in self._groups]
+        force, volume, height = (
+            sum((getattr(own, name) @ mix for own, mix in parts[1:]), getattr(parts[0][0], name) @ parts[0][1])
+            for name in ("force", "volume", "height")
+        )
+        return NumberDerivatives(force, volume, height)
 
     def energies(self, x: Array, pressure: float) -> dict[str, tuple[Array, Array]]:
         """Derivatives of each energy that the scene has with respect to x, and to the numbers at a fixed state."""
@@ -101,15 +101,21 @@ class Sensitive:
             state, by_pressure, numbers = found.state, found.pressure, numbers + found.numbers @ mix
         return state, by_pressure, numbers
 
-    def gas_rates(self, control: Control, pressure: float, volume: float) -> Array:
-        """Derivatives of the equation of a gas through the numbers of its chamber."""
+    def through(self, name: str) -> Array:
+        """How a number of the scene changes with each of the numbers asked for."""
+        return np.array([rate.get(name, 0.0) for rate in self._rates])
+
+    def held_rates(self, control: Control, pressure: float, volume: float) -> Array:
+        """Derivatives of the equation of a control through the chamber of a gas, and through the unit of a held value."""
         rates = np.zeros(len(self.names))
-        for k, name in enumerate(self.names):
-            part, _, key = name.partition(".")
-            if part == "chamber" and hasattr(control, "chamber"):
-                varies = {"volume": "chamber"}.get(key, key)
-                gas: Any = control
-                rates[k] = GasOver(gas.amount, gas.chamber, gas.atmosphere, varies).number_rate(pressure, volume)
+        if isinstance(control, Gas):
+            for name, varies in (("chamber.volume", "chamber"), ("chamber.atmosphere", "atmosphere")):
+                gas = GasOver(control.amount, control.chamber, control.atmosphere, varies)
+                rates += gas.number_rate(pressure, volume) * self.through(name)
+        kind, load = ("gas", control.amount) if isinstance(control, Gas) else (held_name(control), pressure)
+        for k, parameter in enumerate(self.parameters):
+            if isinstance(parameter, Scale):
+                rates[k] += parameter.power(kind) * load / parameter.value
         return rates
 
     def at_control(self, evaluation: Evaluation, pressure: float, control: Control) -> Rates:
@@ -122,11 +128,11 @@ class Sensitive:
         """
         potential, x = evaluation.potential, evaluation.x
         _, row, corner = control.equation(potential.space, x, pressure, evaluation)
-        force, volume, height = self.equations(x, pressure)
-        held = _held_rates(control, pressure, volume, height) + self.gas_rates(control, pressure, evaluation.volume)
+        own = self.equations(x, pressure)
+        held = held_rates(control, pressure, own.volume, own.height) + self.held_rates(control, pressure, evaluation.volume)
         border = evaluation.border(row, corner)
         refuse_fold(evaluation, border, control)
-        return _solved(border, evaluation, force, held, volume, height)
+        return solved(border, evaluation, held, own)
 
     def at_fold(self, evaluation: Evaluation, pressure: float, kind: str) -> Rates:
         """How a limit point or a volume fold of the scene moves with the numbers.
@@ -139,13 +145,9 @@ class Sensitive:
         x = evaluation.x
         mode, q = null_vector(evaluation, kind)
         row, corner, numbers = self.form(x, pressure, mode, q)
-        force, volume, height = self.equations(x, pressure)
+        own = self.equations(x, pressure)
         border = evaluation.border(np.ascontiguousarray(row), corner)
-        return _solved(border, evaluation, force, numbers, volume, height)
-
-
-def _named(scene: Scene, name: str) -> Parameter:
-    return Numbers(scene, (name,)).parameters[0]
+        return solved(border, evaluation, numbers, own)
 
 
 def _mixed(rates: Sequence[dict[str, float]], group: Sequence[str]) -> Array:
@@ -153,7 +155,7 @@ def _mixed(rates: Sequence[dict[str, float]], group: Sequence[str]) -> Array:
     return np.array([[rate.get(name, 0.0) for rate in rates] for name in group]).reshape(len(group), len(rates))
 
 
-def _held_rates(control: Control, pressure: float, volume: Array, height: Array) -> Array:
+def held_rates(control: Control, pressure: float, volume: Array, height: Array) -> Array:
     """Derivatives of the equation of a control with respect to numbers that move an end, at fixed (x, P)."""
     if isinstance(control, CONTROLS["center_height"].at):  # type: ignore[arg-type]
         return height
@@ -166,7 +168,7 @@ def _held_rates(control: Control, pressure: float, volume: Array, height: Array)
 def refuse_fold(evaluation: Evaluation, border: Border, control: Control) -> None:
     """Refuse a state that has no derivative at the held quantity, as it is stationary there."""
     dx, dp = border.solve(np.zeros_like(evaluation.x), 1.0)
-    space, name = evaluation.potential.space, _name(control)
+    space, name = evaluation.potential.space, held_name(control)
     unit = space.units.get(name, 1.0)
     square = inner(evaluation.potential, dx, dp, dx, dp)
     if not square * unit**2 < _AT_FOLD**2:
@@ -175,37 +177,33 @@ def refuse_fold(evaluation: Evaluation, border: Border, control: Control) -> Non
         raise SolveError(message, status=Status.NOT_CONVERGED)
 
 
-def _name(control: Control) -> str:
+def held_name(control: Control) -> str:
     return next((name for name, kind in CONTROLS.items() if type(control) is kind.at), "amount of gas")
 
 
-def _solved(border: Border, evaluation: Evaluation, force: Array, held: Array, volume: Array, height: Array) -> Rates:
-    columns = [border.solve(-np.ascontiguousarray(force[:, k]), -float(held[k])) for k in range(len(held))]
-    dx = np.stack([column for column, _ in columns], axis=1) if columns else force
+def solved(border: Border, evaluation: Evaluation, held: Array, own: NumberDerivatives) -> Rates:
+    """The derivatives of a state from factors, and from those of the equations at a fixed state; one back-substitution a number."""
+    columns = [border.solve(-np.ascontiguousarray(own.force[:, k]), -float(held[k])) for k in range(len(held))]
+    dx = np.stack([column for column, _ in columns], axis=1) if columns else own.force
     dp = np.array([float(p) for _, p in columns])
     if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
         raise SolveError("the equations are singular at this equilibrium, which has no derivative", status=Status.NOT_CONVERGED)
     space = evaluation.potential.space
     pole = dx[space.pole] if space.pole < space.n_free else 0.0
-    return Rates(dx, dp, evaluation.volume_gradient @ dx + volume, pole + height)
+    return Rates(dx, dp, evaluation.volume_gradient @ dx + own.volume, pole + own.height)
 
 
 def null_vector(evaluation: Evaluation, kind: str) -> tuple[Array, float]:
-    """The null vector (v, q) at a fold of a kind, by inverse iteration, of unit length in v."""
-    gradient = evaluation.volume_gradient
-    factor = BandFactor.of(evaluation)
-    mode, q = gradient, 0.0
-    if kind == "limit_point":
-        for _ in range(_SWEEPS):
-            mode = factor.solve(mode)
-            mode = mode / np.linalg.norm(mode)
-        return mode, 0.0
-    bordered = BorderedFactor(factor, -gradient, -gradient, 0.0)
-    for _ in range(_SWEEPS):
-        mode, q = bordered.solve(mode, q)
+    """The null vector (v, q) at a fold of a kind, of unit length in v.
+
+    At a limit point K v = 0, by inverse iteration. At a volume fold K is regular, and K v = q V'.
+    """
+    factor, mode, q = BandFactor.of(evaluation), evaluation.volume_gradient, 0.0
+    for _ in range(_SWEEPS if kind == "limit_point" else 1):
+        mode = factor.solve(mode)
         size = float(np.linalg.norm(mode))
-        mode, q = mode / size, q / size
-    return mode, q
+        mode, q = mode / size, 1 / size
+    return mode, 0.0 if kind == "limit_point" else q
 
 
 @lru_cache(maxsize=16)

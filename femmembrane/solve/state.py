@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .newton import NewtonResult, correct
 class State:
     """An equilibrium as the solvers see it: unknowns, and the evaluation there.
 
+    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders of contact where there are any.
     ``correction`` is the relative size of the Newton correction at x, ``gap`` the error of the control equation there.
     """
 
@@ -121,6 +123,10 @@ class Predictor:
         return hermite(self.point[0], self.slope[0], self.point[1], self.slope[1], (sigma - self.sigma[0]) / h, h)
 
 
+#: numbers or vectors
+Values = TypeVar("Values", float, Array)
+
+
 def joined(x: Array, last: float) -> Array:
     """(x, last) as one vector."""
     z = np.empty(len(x) + 1)
@@ -128,7 +134,7 @@ def joined(x: Array, last: float) -> Array:
     return z
 
 
-def hermite(a: Array, slope_a: Array, b: Array, slope_b: Array, t: float, length: float = 1.0) -> Array:
+def hermite(a: Values, slope_a: Values, b: Values, slope_b: Values, t: float, length: float = 1.0) -> Values:
     """Cubic with values and slopes, per unit of a length, at t = 0 and t = 1; extrapolates beyond."""
     back = t - 1
     at_a = (1 + 2 * t) * back * back

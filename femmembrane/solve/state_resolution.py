@@ -64,7 +64,7 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
     if reason := _pulled_at_an_edge(potential, state, scene):
         return reason
     kinks = _kinks(potential, state.x)
-    worst = float(kinks.max(initial=0.0))
+    worst = float(np.maximum.reduce(kinks, initial=0.0))
     if worst <= (_KINK_STRAIGHT if scene.degree == 1 else _KINK) or not space.n_elements > 1:  # one element is no mesh to judge
         return ""
     where = int(kinks.argmax())
@@ -119,8 +119,10 @@ def _pull_at_edges(potential: Potential, state: State) -> dict[float, float]:
     """
     space = potential.space
     left: dict[float, float] = {}
+    if potential.sources:
+        return left
     loose = [k for k, end in enumerate(space.supports) if not (space.on_axis[k] or "u" in end.held)]
-    if not loose or potential.sources:
+    if not loose:
         return left
     stress = state.evaluation.stress.reshape(2, *space.R.shape)
     scale = float(max(stress.max(), -stress.min()))

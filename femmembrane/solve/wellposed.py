@@ -53,7 +53,8 @@ class IllPosed:
     turned : bool
         Whether a magnetic energy that depends on the slope counts as well.
     pulled : bool
-        Whether it is a field that takes the stiffness of the sheet along the meridian, see :mod:`.pull_in`.
+        Whether the sheet has no stiffness along the meridian there: a field took it, see :mod:`.pull_in`. With ``turned`` it is stress and
+        field together that leave none.
     """
 
     low: float
@@ -76,7 +77,8 @@ class IllPosed:
     def __str__(self) -> str:
         doubt = "" if self.confirmed else f" ({UNCONFIRMED})"
         if self.pulled:
-            return f"the field leaves no stiffness along the meridian at {self.where}: the sheet is pulled in there"
+            who = "stress and field leave" if self.turned else "the field leaves"
+            return f"{who} no stiffness along the meridian at {self.where}: the sheet is pulled in there{doubt}"
         if self.slack:
             return f"the meridional tension vanishes at {self.where}: the membrane is slack and folds there{doubt}"
         if self.turned:
@@ -89,7 +91,7 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     shows.
     """
     found = apparent(potential, evaluation)
-    if found is None or found.pulled:
+    if found is None or (found.pulled and not found.turned):
         return found
     if found.slack:
         sure = confirmed(lambda finer: _nearly_slack(finer.evaluation), potential, evaluation)
@@ -118,7 +120,21 @@ def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     r = potential.space.R.ravel()[unsupported(supporting(evaluation)[0], scale, slack) | (not scale)]
     if slack:
         r = np.append(r, _folds(potential, evaluation, scale))
-    return IllPosed(float(r.min()), float(r.max()), slack, turned=potential.tilts) if r.size else None
+    if not r.size:
+        return None
+    soft = np.zeros(0) if slack else softened(evaluation)
+    return _pulled_apart(soft) if soft.size else IllPosed(float(r.min()), float(r.max()), slack, turned=potential.tilts)
+
+
+def _pulled_apart(soft: Array, sure: bool = True) -> IllPosed:
+    """Where nothing is left of the stiffness along the meridian of a sheet whose magnetic energy depends on the slope."""
+    return IllPosed(float(soft.min()), float(soft.max()), False, sure, turned=True, pulled=True)
+
+
+def softened(evaluation: Evaluation) -> Array:
+    """Reference radii at which a sheet whose magnetic energy depends on the slope has no stiffness along the meridian; none of others."""
+    potential = evaluation.potential
+    return potential.space.R[_along_meridian(evaluation)[0] <= 0] if potential.tilts else np.zeros(0)
 
 
 def supporting(evaluation: Evaluation) -> Array:
@@ -131,16 +147,23 @@ def supporting(evaluation: Evaluation) -> Array:
     potential = evaluation.potential
     if not potential.tilts:
         return evaluation.stress
-    space = potential.space
+    along, mixed, across = _along_meridian(evaluation)
+    left = np.where(along > 0, across - mixed**2 / np.where(along > 0, along, 1.0), np.minimum(along, across))
+    return np.stack([left.ravel(), evaluation.stress[1]])
+
+
+def _along_meridian(evaluation: Evaluation) -> tuple[Array, Array, Array]:
+    """Second derivatives of the density with respect to the stretch of the meridian, to stretch and turn, and to its turn; times the square
+    of the slope.
+    """
+    potential, space = evaluation.potential, evaluation.potential.space
     _, u_x, _, w_x = space.displacement_at_quadrature(evaluation.x)
     rho_x, eta_x, stiffness = space.R_x + u_x, space.Z_x + w_x, evaluation.stiffness_density.reshape(-1, *space.R.shape)
     uu, uw, ww = (stiffness[HESSIAN_PAIRS.index(pair)] for pair in ((1, 1), (1, 3), (3, 3)))
-    # times the square of the slope, and the weights taken out
-    along = (rho_x**2 * uu + 2 * rho_x * eta_x * uw + eta_x**2 * ww) / potential.bulk
+    along = (rho_x**2 * uu + 2 * rho_x * eta_x * uw + eta_x**2 * ww) / potential.bulk  # the weights taken out
     mixed = ((rho_x**2 - eta_x**2) * uw + rho_x * eta_x * (ww - uu)) / potential.bulk
     across = (eta_x**2 * uu - 2 * rho_x * eta_x * uw + rho_x**2 * ww) / potential.bulk
-    left = np.where(along > 0, across - mixed**2 / np.where(along > 0, along, 1.0), np.minimum(along, across))
-    return np.stack([left.ravel(), evaluation.stress[1]])
+    return along, mixed, across
 
 
 def stress_scale(evaluation: Evaluation) -> float:
@@ -180,6 +203,9 @@ def compressed(potential: Potential, evaluation: Evaluation, component: int, str
         sure = confirmed(lambda found: least_stress(found.evaluation, component, stresses) < 0, potential, evaluation)
     if sure is False:
         return None
+    soft = np.zeros(0) if component else softened(evaluation)
+    if soft.size:
+        return _pulled_apart(soft, bool(sure))
     r = potential.space.R.ravel()[unsupported(stress, stress_scale(evaluation), False)]
     return IllPosed(float(r.min()), float(r.max()), False, bool(sure), potential.tilts)
 

@@ -11,13 +11,13 @@ error was to the side of its own sign.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
-from numpy.typing import NDArray
+from scipy.linalg import blas
 
-from ..discretization.space import HESSIAN_PAIRS, Space
+from ..discretization.space import Space
+from ..kernels.numpy_kernels import form_parts
 from ..potential import Array, Evaluation
+from .bending import Bending
 
 #: an eigenvalue is small below this part of a typical one: about the eigenvalue of a membrane of the same area under a tension of one shear
 #: modulus
@@ -43,13 +43,13 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
     of_state : float
         :func:`unresolved_stress` of the state.
     """
-    first, second, times = _indices(pairs)
-    products = local.take(first, axis=0)
-    products *= local.take(second, axis=0)
-    products *= density
-    products = products.reshape(len(times), -1)
-    mode = _size(space.highest @ (times @ products).reshape(space.R.shape))
-    return float(mode + of_state * _size(times @ np.abs(products, out=products)))
+    along, terms = form_parts(density, pairs, local, space.highest)
+    return along + of_state * terms
+
+
+def unresolved_bending(space: Space, inside: Array, joints: float, of_state: float) -> float:
+    """The same of the bending of a mode, from its energies at the points and at the joints: a mode that is resolved does not jump."""
+    return _size(space.highest @ inside) + joints + of_state * _size(inside)
 
 
 def unresolved_stress(space: Space, stress: Array) -> float:
@@ -62,19 +62,16 @@ def unresolved_stress(space: Space, stress: Array) -> float:
 
 def _size(values: Array) -> float:
     """Sum of absolute values."""
-    return float(np.add.reduce(np.abs(values), axis=None))
+    return float(blas.dasum(values.ravel()))
 
 
-def unresolved_axisymmetric(space: Space, evaluation: Evaluation, mode: Array) -> float:
+def unresolved_axisymmetric(evaluation: Evaluation, mode: Array, bending: Bending | None = None) -> float:
     """:func:`unresolved` for an axisymmetric mode."""
-    shape = (space.n_quadrature, space.n_elements)
-    local = evaluation.elements.at_quadrature(np.ascontiguousarray(mode)).reshape(4, *shape)
-    of_state = evaluation.once("unresolved stress", lambda state: unresolved_stress(space, state.stress))
-    return unresolved(space, evaluation.stiffness_density.reshape(-1, *shape), HESSIAN_PAIRS, local, of_state)
+    along, terms = evaluation.form_parts(mode)
+    of_state = evaluation.once("unresolved stress", _of_state)
+    part = along + of_state * terms
+    return part if bending is None else part + unresolved_bending(evaluation.potential.space, *bending.densities(mode), of_state)
 
 
-@lru_cache(maxsize=8)
-def _indices(pairs: tuple[tuple[int, int], ...]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """First and second of each pair, and how often it counts in a quadratic form."""
-    first, second = np.array(pairs).T
-    return first, second, np.where(first == second, 1.0, 2.0)
+def _of_state(evaluation: Evaluation) -> float:
+    return unresolved_stress(evaluation.potential.space, evaluation.stress)

@@ -16,12 +16,11 @@ from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
 from ..physics.magnetisation import Magnetisation, remanence_column
 from ..physics.response import response_of
-from ..physics.scales import Scales
 from ..physics.sheet import Sheet
 from ..physics.stress import magnetised_stress, total_stress
 from ..physics.tension_field import TensionField, cauchy_stress
 from ..potential import potential_of
-from ..quantities import quantity, si_values
+from ..quantities import Converter, quantity, si_values
 from ..scene import Scene
 
 Array = NDArray[np.float64]
@@ -62,8 +61,10 @@ class Profile:
     beyond: tuple[Array, Array] | None = None
     field: Array | None = None
 
-    def columns(self, scales: Scales | None = None) -> dict[str, Array]:
-        """The profile by the names of its columns, with stretches in place of strains, and the stresses in Pa too if there are scales."""
+    def columns(self, scales: Converter | None = None) -> dict[str, Array]:
+        """The profile by the names of its columns, with stretches in place of strains; stresses and field in SI units too where there are
+        scales.
+        """
         columns = {
             "r": self.r,
             **({} if self.s is None else {"s": self.s}),
@@ -78,8 +79,13 @@ class Profile:
             **({} if self.field is None else {"electric_field": self.field}),
         }
         if scales is not None:
-            columns |= si_values({name: values for name, values in columns.items() if quantity(name).si == "stress"}, scales)
+            columns |= si_values({name: values for name, values in columns.items() if _converted(name, scales)}, scales)
         return columns
+
+
+def _converted(name: str, scales: Converter) -> bool:
+    kind = quantity(name).si
+    return kind in ("stress", "electric_field") and scales.converts(kind)
 
 
 def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
@@ -108,7 +114,7 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     rho, eta = R + u, Z + w
     response = response_of(scene, None if scene.electricity is None else potential_of(scene).local_square(x, R, Z, s))
     effective = mechanical = cauchy_stress(response, e1, e2)
-    field = None
+    field = None if scene.electric is None else np.zeros_like(e1)  # one of a family may have no voltage
     if isinstance(response, (Electrified, ElectricTensionField)):
         mechanical, field = response.mechanical_stress(e1, e2), np.sqrt(response.field_squared(e1, e2))
     if (sheet := Sheet.of(scene)) is not None:

@@ -22,6 +22,9 @@ from ..solve.state import State
 #: the quantities that can be held, by the words that users have for them
 HELD = {**{name: name for name in CONTROLS}, **PRESCRIBED, GAS: GAS}
 
+#: a number that no membrane notices, in place of 0 where all derivatives vanish: a large one may leave a tension field no state
+_SLIGHT = 1e-3
+
 
 @dataclass(frozen=True)
 class Hold:
@@ -89,6 +92,8 @@ def checked_number(key: str, scene: Scene, over: Any) -> Parameter:
     InputError
         For a name that the scene does not have.
     """
+    if scene.bodies:
+        raise InputError(key, over, "not done beside an obstacle; a run for each scene, with start=, is allowed")
     if over in HELD:
         allowed = ", ".join(names(scene)) or "(this scene has none)"
         raise InputError(key, over, f"no number of the scene; inflate, pressurize and trace follow it as it is. Numbers: {allowed}")
@@ -100,7 +105,7 @@ def checked_number(key: str, scene: Scene, over: Any) -> Parameter:
 
 def family_of(parameter: Parameter) -> Family:
     """The potential of the scenes that differ in a number."""
-    return Family(parameter.scene, parameter.vary, scene_at=parameter.scene_at)
+    return Family(parameter.scene, parameter.vary, scene_at=parameter.scene_at, even=parameter.even)
 
 
 def gas_of(scene: Scene, key: str) -> Gas:
@@ -143,7 +148,7 @@ class OverNumber:
         if self.parameter.name.startswith("chamber.") or self.family.moves:
             return
         family, value = self.family, state.evaluation.factor
-        if self.parameter.name.startswith("electric."):  # forces are even in it: at 0 all derivatives vanish
-            value = value or 1.0
+        if self.parameter.even:  # at 0 all derivatives vanish
+            value = value or _SLIGHT
         if not np.any(family.number_derivative(state.x, state.pressure, value)):
             raise InputError("over", self.parameter.name, "it changes no force on this membrane, so that nothing would happen")

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Generic, Self, TypeAlias, TypeVar
 
 from ..errors import Status
@@ -95,7 +94,8 @@ class Run(ABC, Generic[R]):
 
     def scene_of(self, state: State) -> Scene:
         """The scene of a state."""
-        return self.scene
+        own = state.evaluation.potential
+        return self.scene.bordered(own.scene.borders) if own.obstacles else self.scene
 
     @abstractmethod
     def step(self) -> End | None:
@@ -112,14 +112,24 @@ class Run(ABC, Generic[R]):
                 on_checkpoint(self.result(Status.INTERRUPTED, "interrupted", SoFar(self.found)))
         return self.result(*end)
 
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
+    def timed(self, stage: str) -> Timed:
         """Add the seconds of a block to a stage."""
-        clock = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.timings[stage] += time.perf_counter() - clock
+        return Timed(self.timings, stage)
+
+
+class Timed:
+    """A block of which the seconds are added to those of a stage."""
+
+    __slots__ = ("_clock", "_stage", "_timings")
+
+    def __init__(self, timings: dict[str, float], stage: str) -> None:
+        self._timings, self._stage = timings, stage
+
+    def __enter__(self) -> None:
+        self._clock = time.perf_counter()
+
+    def __exit__(self, *error: object) -> None:
+        self._timings[self._stage] += time.perf_counter() - self._clock
 
 
 def carry_out(

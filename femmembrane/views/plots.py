@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quantities import Units, axis_label, caption
-from .branch_lines import MARKERS, answer, draw_branch
+from .branch_lines import MARKERS, after, answer, draw_branch
 from .figures import (
     AMONG,
     BOTH,
@@ -47,6 +47,7 @@ __all__ = [
     "UNSTABLE",
     "VOLUME_ONLY",
     "Style",
+    "after",
     "answer",
     "draw_branch",
     "draw_legend",
@@ -152,7 +153,7 @@ def plot_profiles(
     if count < 1:
         raise InputError("count", count, "a whole number >= 1 is allowed")
     shown = [branch[int(k)] for k in np.unique(np.linspace(len(branch) - 1, 0, min(count, len(branch))).round().astype(int))]
-    chosen = Units.of(units, branch.scene.scales)
+    chosen = Units.of(units, branch.scene.converter)
     figure, axes = new_figure((6.4, 5.6), title=branch.scene.title)
     from matplotlib import colormaps
 
@@ -195,7 +196,7 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None, *, units
 
 def draw_zones(axes: Axes, branch: Branch, *, units: str = "scaled") -> list[Any]:
     """The zones of a branch on labelled axes, as in :func:`plot_zones`; handles for a legend."""
-    chosen = Units.of(units, branch.scene.scales)
+    chosen = Units.of(units, branch.scene.converter)
     volume = chosen.factor("volume") * np.array([equilibrium.volume for equilibrium in branch])
     steps = np.diff(volume)
     monotone = steps.size > 0 and bool((steps > 0).all() or (steps < 0).all())

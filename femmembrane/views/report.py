@@ -70,7 +70,7 @@ def write_report(branch: Branch, path: str | PathLike[str], facts: Mapping[str, 
 
 def report(branch: Branch, facts: Mapping[str, Any] | None = None, units: str = "scaled") -> str:
     """The page as text; see :func:`write_report`."""
-    page = _Page(branch, facts or {}, units, Units.of(units, branch.scene.scales))
+    page = _Page(branch, facts or {}, units, Units.of(units, branch.scene.converter))
     sections = [(name, body) for name, body in page.sections() if body]
     title = branch.scene.title or "Inflated membrane"
     links = "".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name, _ in sections)
@@ -186,14 +186,17 @@ class _Page:
         names, over = {kind: name for kind, (_, name) in plots.MARKERS.items()}, [self.branch.over] if self.branch.over else []
         rows = [
             [
-                names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
+                names.get(str(p.kind), str(p.kind))
+                + (f", n = {p.azimuthal}" if p.azimuthal else "")
+                + (f", {word}" if (word := plots.after(p)) else ""),
                 *(p.equilibrium.number(name) for name in over),
                 *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
-        return table(["special point", *over, *(heading_in(name, self.units) for name in PLACES), "relative error"], rows)
+        said = "".join(f"<p>{escape(p.postbuckling.words[:1].upper() + p.postbuckling.words[1:])}.</p>" for p in points if p.azimuthal)
+        return table(["special point", *over, *(heading_in(name, self.units) for name in PLACES), "relative error"], rows) + said
 
     def _jumps(self) -> str:
         names, rows = ("volume", "pressure"), []

@@ -16,7 +16,7 @@ import pytest
 
 import femmembrane as fm
 from femmembrane import kernels as switch
-from femmembrane.discretization.space import space_of
+from femmembrane.discretization.space import HESSIAN_PAIRS, space_of
 from femmembrane.errors import Status
 from femmembrane.kernels.compiled_kernels import CompiledKernels
 from femmembrane.kernels.numpy_kernels import NumpyKernels
@@ -104,6 +104,23 @@ def test_a_step_solves_the_bordered_system(name):
         assert rate == dp
         for vector, largest in ((dx, change), (x, size)):
             assert largest == tuple(np.abs(vector[index]).max(initial=0.0) for index in potential.space.fields)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_parts_of_a_quadratic_form(name):
+    """Term by term from the densities and the local variables, element after element; with weights of one and no sign it is x . K x."""
+    potential = potential_of(SHAPES[name])
+    space, mode = potential.space, dome(potential, -0.4)
+    evaluation = potential.evaluate(dome(potential), 1.3)
+    local = space.at_quadrature(mode).reshape(4, -1)
+    density = evaluation.stiffness_density.reshape(len(HESSIAN_PAIRS), -1)
+    terms = np.array([(1 + (i != j)) * k * local[i] * local[j] for (i, j), k in zip(HESSIAN_PAIRS, density, strict=True)])
+    integrand = terms.sum(axis=0).reshape(space.n_quadrature, space.n_elements)
+    assert integrand.sum() == pytest.approx(evaluation.inner(mode, mode), rel=1e-10)
+    expected = sum(abs(space.highest @ column) for column in integrand.T), np.abs(terms).sum()
+    atol = 1e-12 * expected[1]
+    for found in (evaluation.form_parts(mode), in_numpy(lambda: potential.evaluate(dome(potential), 1.3).form_parts(mode))):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=atol)
 
 
 def test_blocks_are_met_whole_and_in_part():
@@ -307,6 +324,10 @@ def test_wrong_arrays_are_refused():
             elements.evaluate(x, 0.0, 1.0, room, densities)
     with pytest.raises(ValueError, match="x"):
         elements.evaluate(np.zeros(n, dtype=np.int64), 0.0, 1.0, gradients, densities)
+    weights = potential.space.highest
+    for name, mode, part in (("x", np.zeros(n - 1), weights), ("weights", np.zeros(n), weights[1:])):
+        with pytest.raises(ValueError, match=name):
+            elements.form_parts(densities, mode, part)
     with pytest.raises(ValueError, match="band"):
         module.Factor(np.zeros((3, 4)), 4, 1)
     tape = record_tape(potential.point_function, module.OPERATIONS)

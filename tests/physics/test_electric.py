@@ -9,8 +9,13 @@ from scipy.special import jn_zeros
 import femmembrane as fm
 from femmembrane.accuracy.shooting import Guess, shoot
 from femmembrane.potential import potential_of
+from femmembrane.potential.family import Family
+from femmembrane.scene.variation import Parameter
 from femmembrane.solve.banded import band_product
+from femmembrane.solve.controls import PressureControl, VolumeControl
+from femmembrane.solve.minimize import minimize
 from femmembrane.solve.pull_in import moduli
+from femmembrane.views.report import report
 from tests.cases import OGDEN, effect
 
 DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=6)
@@ -245,6 +250,68 @@ def test_fold_curve_over_the_voltage():
     assert np.array(curve.values) ** 2 == pytest.approx(7 * stretch**-8 - stretch**-2, rel=1e-6)
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_fold_curve_over_a_total_charge(direction):
+    """The limit point of a sphere over Q = 4 pi q: l^6 = 7 (1 + q^2), down to q = 0 and through q^2 = 3, where all pears are neutral."""
+    scene, limit = under(SPHERE, total_charge=4 * np.pi * 0.7), (7 * 1.49) ** (1 / 6)
+    branch = fm.trace(scene, start=ball(0.97 * limit), until={"volume": ball(1.03 * limit)})
+    (start,) = branch.special_points
+    bounds = (0.0, 4 * np.pi * 2.5)
+    curve = fm.fold_curve(scene, start=start, parameter="electric.total_charge", bounds=bounds, direction=direction)
+    q = np.array(curve.values) / (4 * np.pi)
+    assert curve.values[-1] == bounds[direction > 0]
+    assert np.cbrt(np.array(curve.volume) * 3 / (4 * np.pi)) == pytest.approx((7 * (1 + q**2)) ** (1 / 6), rel=1e-9)
+
+
+@pytest.mark.parametrize("tension_field", [False, True])
+@pytest.mark.parametrize(
+    ("number", "value"),
+    [("electric.total_charge", 0.3), ("material.jm", 30.0), ("membrane.prestretch", 1.05), ("material.poisson_ratio", 0.3)],
+)
+def test_third_derivatives_of_a_total_charge(number, value, tension_field):
+    """What a fold curve needs, by central differences of the quadratic form; electrodes on a part."""
+    material = fm.Hooke(0.3) if number == "material.poisson_ratio" else fm.Gent(30.0)
+    scene = DISC.replace(material=material, mesh=fm.disc(4), degree=3, tension_field=tension_field, prestretch=1.01)
+    scene = under(scene, total_charge=0.3, start=0.2, stop=0.53)
+    parameter = Parameter(scene, number)
+    family = Family(scene, parameter.vary, scene_at=parameter.scene_at)
+    r = family.space.interpolation_points()
+    rise = 0.2 if number == "material.poisson_ratio" else 0.5
+    x = family.space.interpolate((-0.3 if tension_field else -0.05) * r * (1 - r**2), rise * (1 - r**4))
+    mode, direction = np.random.default_rng(1).standard_normal((2, x.size))
+
+    def form(step, pressure, change):
+        at = family.evaluate(x + step * direction, 0.4 + pressure, value + change)
+        return at.inner(mode, mode) - 2 * 0.3 * (at.volume_gradient @ mode)
+
+    found, h = family.fold_derivatives(x, 0.4, value, mode, 0.3), 1e-6
+    slopes = [(form(*(h * step)) - form(*(-h * step))) / (2 * h) for step in np.eye(3)]
+    assert (found.cubic @ direction, found.cubic_pressure, found.cubic_number) == pytest.approx(slopes, rel=2e-6)
+
+
+@pytest.mark.parametrize("tension_field", [False, True])
+@pytest.mark.parametrize("charge", [1e-12, 0.8])
+def test_ipopt_with_a_total_charge(charge, tension_field):
+    """The voltage as an unknown with the charge as its equation: IPOPT ends where Newton's method does, also without a charge."""
+    scene = under(DISC, total_charge=charge).replace(mesh=fm.disc(8), degree=4, tension_field=tension_field)
+    exact, potential = fm.equilibrium(scene, volume=0.9, solver="newton"), potential_of(scene)
+    for control, factor in ((VolumeControl(0.9), 1.0), (PressureControl(exact.pressure), 1.0), (VolumeControl(0.9), 0.0)):
+        x, pressure, iterations, status = minimize(potential, control, 1.05 * exact.state, exact.pressure, magnetic=factor)
+        assert status == "Solve_Succeeded"
+        assert 0 < iterations < 10
+        wanted = exact if factor else fm.equilibrium(under(scene, voltage=0.0), volume=0.9)
+        assert pressure == pytest.approx(wanted.pressure, rel=1e-8)
+        assert x == pytest.approx(wanted.state, abs=1e-8)
+    assert fm.equilibrium(scene, volume=0.9, solver="ipopt").voltage == pytest.approx(exact.voltage, rel=1e-9)
+
+
+def test_a_charge_beyond_all_bounds_is_a_number_that_is_none():
+    """Outside the domain of the energy a charge has no voltage, and a search goes on from there."""
+    scene = under(DISC, total_charge=3.0, start=0.2, stop=0.6).replace(mesh=fm.disc(8), degree=4, tension_field=True)
+    with pytest.raises(fm.SolveError, match="no equilibrium was found"):
+        fm.equilibrium(scene, volume=0.9, solver="newton")
+
+
 def test_units():
     """eps = 4.7 eps0, Phi = 5 kV, T = 0.5 mm, mu = 45 kPa: phi^2 = 0.0924771."""
     scales = fm.Scales(radius=0.05, thickness=5e-4, shear_modulus=45e3)
@@ -307,6 +374,37 @@ def test_columns_and_files(tmp_path):
     assert again[1].electric_energy == branch[1].electric_energy
     assert again[1].charge == branch[1].charge
     assert not {"electric_energy", "voltage"} & set(fm.inflate(DISC, volumes=[1.0]).to_dataframe())
+    assert not {"voltage", "capacitance"} & set(fm.inflate(under(DISC, frozen_charge=0.2), volumes=[1.0]).to_dataframe())
+
+
+def test_columns_in_si_units(tmp_path):
+    """V, C, F and V/m where the scene has scales and a permittivity: Q = C U, and E = U over the thickness that is left."""
+    scene = DISC.replace(scales=fm.Scales(radius=0.05, thickness=5e-4, shear_modulus=45e3))
+    volts = under(scene, voltage=5e3, relative_permittivity=4.7, breakdown=5e7)
+    branch = fm.vary(volts, "electric.voltage", [5e3, 2.5e3, 0.0], hold={"volume": 1.0})
+    frame = branch.to_dataframe()
+    assert frame["voltage_v"].tolist() == pytest.approx([5e3, 2.5e3, 0.0])
+    np.testing.assert_allclose(frame["capacitance_f"], 8.8541878e-12 * 4.7 * 0.05**2 / 5e-4 * frame["capacitance"], rtol=1e-7)
+    np.testing.assert_allclose(frame["charge_c"], frame["voltage_v"] * frame["capacitance_f"], rtol=1e-12)
+    np.testing.assert_allclose(frame["breakdown_ratio"], frame["electric_field_v_per_m"] / 5e7, rtol=1e-12)
+    assert frame["electric_field_v_per_m"][0] == pytest.approx(frame["electric_field"][0] / frame["voltage"][0] * 5e3 / 5e-4, rel=1e-12)
+    assert frame["charge_c"][2] == frame["electric_field"][2] == frame["breakdown_ratio"][2] == 0
+    assert "charge in µC" in str(branch)
+    branch.save(tmp_path / "branch.nc")
+    again = fm.load(tmp_path / "branch.nc")
+    assert again.to_dataframe().equals(frame)
+    variables = branch.to_xarray()
+    assert (variables["voltage_v"].attrs["units"], variables["electric_field_v_per_m"].dims) == ("V", ("step",))
+    assert variables["electric_field_profile"].dims == ("step", "node")
+    assert branch[0].profile()["electric_field_v_per_m"].max() == pytest.approx(frame["electric_field_v_per_m"][0], rel=0.02)
+    axes = branch.plot(x="voltage", y="charge", units="si")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("voltage in kV", "charge in µC")
+    page = report(branch, units="si")
+    assert "Voltage and charge" in page
+    assert "0 of the breakdown field" in page
+    numbers = fm.inflate(under(scene, voltage=0.3), volumes=[1.0])  # without a permittivity nobody knows the volts
+    assert not {"voltage_v", "charge_c"} & set(numbers.to_dataframe())
+    assert numbers.plot(x="voltage", y="pressure", units="si").get_xlabel().startswith("voltage φ")
 
 
 def test_pulled_in():

@@ -8,6 +8,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.physics.response import response_of
 from femmembrane.physics.tension_field import natural_strains
+from femmembrane.potential import potential_of
 from tests.cases import OGDEN
 
 DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), degree=4, tension_field=True)
@@ -81,6 +82,23 @@ def test_wrinkles_are_a_local_minimum():
     assert wrinkled.any()
     mechanical = response.mechanical_stress(e1, e2)[1][wrinkled]
     assert mechanical == pytest.approx(response.field_squared(e1, e2)[wrinkled], rel=1e-10)
+
+
+@pytest.mark.parametrize("material", [fm.NeoHookean(), fm.Ogden.treloar(), fm.Hooke(0.3)], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("tension_field", [False, True])
+def test_the_potential_has_the_same_response(material, tension_field):
+    """What elements compute is what formulas say, where there is no state, and so no number, as well."""
+    scene = DISC.replace(material=material, electric=fm.Electric(voltage=1.0), tension_field=tension_field)
+    scale = 0.3 if isinstance(material, fm.Hooke) else 1.0
+    e1, e2 = scale * STRAINS
+    lost = 0
+    for square in (0.02, 0.4, 0.8, 3.0):
+        response = response_of(scene, np.full_like(e1, square))
+        expected = np.stack([*response.stress(e1, e2), *response.tangent(e1, e2)])
+        found = potential_of(scene).response(e1, e2, np.full_like(e1, square))
+        np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-9, atol=1e-12)
+        lost += int(np.isnan(found[0]).sum())
+    assert bool(lost) == (tension_field or isinstance(material, fm.Hooke))
 
 
 def test_branch():

@@ -16,6 +16,7 @@ from femmembrane.physics.sources import loop_field
 from femmembrane.potential import Family, Potential, potential_of
 from femmembrane.potential.expressions import casadi_answers_numpy
 from femmembrane.scene.variation import Parameter, names
+from femmembrane.solve.contact import Watch, touches_source
 from femmembrane.solve.controls import PressureControl
 from femmembrane.solve.guess import spherical_dome
 from femmembrane.solve.newton import correct
@@ -390,6 +391,21 @@ def test_waves_around_the_axis_feel_the_second_derivatives(name):
     x = spherical_dome(potential, 1.0)
     band = potential.evaluate(x, 1.3).band
     np.testing.assert_allclose(azimuthal_operator(potential, x, 1.3, 0).band, band, rtol=0, atol=1e-11 * np.abs(band).max())
+
+
+def test_sources_far_off_are_not_measured_again(monkeypatch):
+    """A dome that rises to a dipole, and is moved sideways by its points as well: it touches where its distance says so."""
+    potential = potential_of(magnetic_scene(degree=3).replace(sources=[fm.Dipole(200.0, 6.5)]))
+    space, measured = potential.space, []
+    r = space.mesh.position(space.interpolation_points())[0]
+    states = [space.interpolate(0.1 * h * r * (1 - r), h * (1 - r**2)) for h in [*np.linspace(0.0, 6.4, 60), 6.49, 6.4985, 6.4992]]
+    expected = [touches_source(potential.distance_to_sources(x), space.unit) for x in states]
+    assert [bool(words) for words in expected] == [False] * 62 + [True]
+    distance = Potential.distance_to_sources
+    monkeypatch.setattr(Potential, "distance_to_sources", lambda self, x: measured.append(1) or distance(self, x))
+    watch = Watch()
+    assert [watch.touches(potential, x) for x in states] == expected
+    assert len(measured) < len(states) / 2
 
 
 def test_a_wire_through_a_membrane_with_a_hole():

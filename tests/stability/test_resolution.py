@@ -74,6 +74,14 @@ def test_where_the_mesh_is_good_nothing_is_solved_again(volume, monkeypatch):
         assert verdict.smallest_eigenvalue == pytest.approx(other.smallest_eigenvalue, rel=1e-4)
 
 
+def test_a_verdict_that_is_known_is_not_asked_for_again(monkeypatch):
+    """Nor is the potential of its scene, which a long branch would look up at every step."""
+    eq = fm.equilibrium(disc_scene(elements=4), volume=0.5, solver="newton")
+    known = eq.verdict("pressure"), eq.verdict(azimuthal=1)
+    monkeypatch.setattr(type(eq), "potential", property(lambda self: pytest.fail("looked up")))
+    assert (eq.verdict("pressure"), eq.verdict(azimuthal=1)) == known
+
+
 # --- the material of a sphere, turned under its shape
 
 

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.potential import potential_of
+from femmembrane.solve.branch import BranchProblem
 from femmembrane.solve.segment import Segment
+from femmembrane.solve.state import inner
 from tests.cases import OGDEN, SCENES, SPECIAL_POINTS, disc_scene
 
 #: name of a scene in tests/data/disc.json -> where a trace starts (a volume) and which pole height it reaches
@@ -60,6 +63,37 @@ def test_until_is_met_exactly():
     assert fm.trace(scene, start=0.5, until={"pressure": 1.6})[-1].pressure == 1.6
     first = fm.trace(scene, start=0.5, until={"volume": 7.0, "pressure": 1.6})
     assert first[-1].pressure == 1.6  # met before the volume
+
+
+@pytest.mark.parametrize("mesh", [fm.disc(elements=6), fm.cylinder(0.4, elements=6)])
+def test_arc_length_is_measured_in_one_band(mesh):
+    """The inner product of (x, P) is that of displacements over the area plus the pressures, in units of a membrane of any size."""
+    potential, random = potential_of(fm.Scene(material=OGDEN, mesh=mesh, degree=3)), np.random.default_rng(1)
+    problem, (a, b) = BranchProblem(potential), random.standard_normal((2, potential.space.n_free + 1))
+    expected = inner(potential, a[:-1], a[-1], b[:-1], b[-1])
+    assert problem.dual(a) @ b == pytest.approx(expected, rel=1e-12)
+    assert problem.norm(a) ** 2 == pytest.approx(inner(potential, a[:-1], a[-1], a[:-1], a[-1]), rel=1e-12)
+
+
+def test_points_between_two_equilibria_are_foretold(monkeypatch):
+    """Folds and the end, to round-off those of Brent's method alone, after two thirds of the corrections or fewer."""
+    resolve, spent = BranchProblem.resolve, []
+
+    def counted(*args):
+        spent.append(args)
+        return resolve(*args)
+
+    monkeypatch.setattr(BranchProblem, "resolve", counted)
+    scene = disc_scene(OGDEN, (200.0, 6.5), elements=16)
+    found = fm.trace(scene, start=0.5, until={"volume": 60.0})
+    few = len(spent)
+    monkeypatch.setattr(Segment, "_by_secants", lambda *_: None)
+    monkeypatch.setattr(Segment, "_share_of", lambda *_: None)
+    expected = fm.trace(scene, start=0.5, until={"volume": 60.0})
+    assert 0 < 3 * few <= 2 * (len(spent) - few)
+    assert [p.kind for p in found.special_points] == [p.kind for p in expected.special_points] != []
+    for a, b in zip([*found.special_points, found[-1]], [*expected.special_points, expected[-1]], strict=True):
+        assert (a.volume, a.pressure, a.center_height) == pytest.approx((b.volume, b.pressure, b.center_height), rel=1e-11)
 
 
 def test_a_branch_is_an_iterator_while_it_runs():

@@ -90,7 +90,7 @@ def test_fields_are_those_of_the_profile(branch: Branch, grids: list[pyvista.Uns
         meridian = np.append(line[:, 0], line[-1, 1])
         expected = np.stack([profile["rho"], 0 * profile["rho"], profile["eta"]], axis=1)
         np.testing.assert_allclose(grid.points[meridian], expected, atol=1e-14)
-        for name in (name for name in vtk.FIELDS if not name.endswith("_pa")):  # the scene has no scales
+        for name in vtk.PROFILE:  # the scene has neither scales nor electrodes
             values = grid.point_data[name]
             assert np.isfinite(values).all()
             np.testing.assert_array_equal(values[meridian], profile[name])

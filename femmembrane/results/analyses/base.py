@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...quantities import Quantity
+from ...quantities import Quantity, Units, heading_in, in_si, written
 
 if TYPE_CHECKING:
     import xarray
@@ -79,6 +79,10 @@ class EquilibriumAnalysis:
         """Names of columns of ``special_points.csv``."""
         return ()
 
+    def found_columns(self, points: Sequence[SpecialPoint]) -> Sequence[str]:
+        """Names of columns of ``special_points.csv`` that the points found ask for, after those of :meth:`point_columns`."""
+        return ()
+
     def point_value(self, point: SpecialPoint, column: str) -> Cell:
         """One cell of a column of special points: the attribute of that name."""
         found: Cell = getattr(point, column)
@@ -144,6 +148,14 @@ class PrintedColumn:
     heading: str
     text: Callable[[Equilibrium], str]
     width: int = 0
+
+
+def printed_in(name: str, units: Units) -> PrintedColumn:
+    """The column of a quantity in these units."""
+    head = heading_in(name, units)
+    width, shown = max(12, len(head)), in_si(name) if units.unit(name) else name
+    factor = units.factor(name)
+    return PrintedColumn(f"{head:>{width}}", lambda equilibrium: written(shown, getattr(equilibrium, name) * factor, width), width)
 
 
 @dataclass(frozen=True)

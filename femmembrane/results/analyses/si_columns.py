@@ -1,12 +1,12 @@
-"""Places and energies in SI units, of a scene with scales."""
+"""Places, energies and electric quantities in SI units, of a scene with scales."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ...quantities import PLACES, Units, heading_in, in_si, quantity, written
-from .base import Cell, EquilibriumAnalysis, PrintedColumn
+from ...quantities import ELECTRIC, PLACES, Units, electric_quantities, in_si, quantity
+from .base import Cell, EquilibriumAnalysis, PrintedColumn, printed_in
 
 if TYPE_CHECKING:
     from ...scene import Scene
@@ -14,8 +14,12 @@ if TYPE_CHECKING:
     from ..special_point import SpecialPoint
 
 
+#: the quantity of each of its columns
+_COLUMNS = {in_si(name): name for name in (*PLACES, "elastic_energy", "magnetic_energy", "load_energy", "electric_energy", *ELECTRIC)}
+
+
 class SIColumns(EquilibriumAnalysis):
-    """Volume, pressure, pole height and energies in SI units; a scene asks for them by its table [scales]."""
+    """Volume, pressure, pole height, energies and what is electric in SI units; a scene asks for them by its table [scales]."""
 
     def asked(self, scene: Scene) -> bool:
         return scene.scales is not None
@@ -33,24 +37,19 @@ class SIColumns(EquilibriumAnalysis):
         return _converted(point, column, point.equilibrium.scene)
 
     def printed(self, scene: Scene) -> Sequence[PrintedColumn]:
-        units = Units(scene.scales)
-        return [_printed(name, units) for name in PLACES]
+        units = Units(scene.converter)
+        return [printed_in(name, units) for name in PLACES]
 
 
 def _names(scene: Scene) -> list[str]:
     parts = {"magnetic_energy": scene.sources, "load_energy": scene.loads, "electric_energy": scene.electric}
-    return [*PLACES, "elastic_energy", *(name for name, part in parts.items() if part)]
+    converter = scene.converter
+    electric = [name for name in electric_quantities(scene) if converter is not None and converter.converts(quantity(name).si)]
+    return [*PLACES, "elastic_energy", *(name for name, part in parts.items() if part), *electric]
 
 
 def _converted(place: Equilibrium | SpecialPoint, column: str, scene: Scene) -> float:
-    name = next(name for name in (*PLACES, "elastic_energy", "magnetic_energy", "load_energy", "electric_energy") if in_si(name) == column)
-    scales = scene.scales
-    return float("nan") if scales is None else float(scales.to_si(quantity(name).si, float(getattr(place, name))))
-
-
-def _printed(name: str, units: Units) -> PrintedColumn:
-    head = heading_in(name, units)
-    width = max(12, len(head))
-    return PrintedColumn(
-        f"{head:>{width}}", lambda equilibrium: written(in_si(name), getattr(equilibrium, name) * units.factor(name), width), width
-    )
+    name, scales = _COLUMNS[column], scene.converter
+    if scales is None or not scales.converts(quantity(name).si):
+        return float("nan")
+    return float(scales.to_si(quantity(name).si, float(getattr(place, name))))

@@ -18,6 +18,7 @@ from ..solve.controls import control_kind
 from ..solve.newton import relative_residual
 from ..threads import one_thread
 from . import door
+from .contact import Contact, contact_of
 
 if TYPE_CHECKING:
     from ..potential import Evaluation, Potential
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
-_OF_POTENTIAL = ("verdict", "errors", "tangent")
+_OF_POTENTIAL = ("verdict", "errors", "tangent", "contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +144,13 @@ class Equilibrium:
 
         return potential_of(self.scene)
 
+    @property
+    def contact(self) -> Contact | None:
+        """Contact with the bodies of the scene, see :class:`~femmembrane.results.contact.Contact`; None where it has none."""
+        if not self.scene.bodies:
+            return None
+        return self.remembered(("contact",), lambda: contact_of(self.potential.evaluate(self.state, self.pressure)))
+
     def number(self, name: str) -> float:
         """A number of its scene.
 
@@ -222,7 +230,11 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        return door.profile_at(self.scene, self.state, self.pressure, self.places(r)).columns(self.scene.converter)
+        s = self.places(r)
+        columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.converter)
+        if (contact := self.contact) is not None:
+            columns |= {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
+        return columns
 
     def places(self, r: ArrayLike | None = None) -> Array:
         """Parameters of the meridian at reference radii, see :meth:`profile`.
@@ -233,6 +245,8 @@ class Equilibrium:
             Default: the nodes.
         """
         space = self.potential.space
+        if r is None:
+            space = self.potential.root.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
     def verdict(
@@ -394,7 +408,8 @@ class Equilibrium:
             ``_pa``, ``_m``, ... as well, while the scales stay.
         to : str or list of str
             Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
-            Numbers that go with one, as other moduli of Ogden's material do, go with it here too.
+            Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
+            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: SI numbers stay, a held pressure included.
         held : {"pressure", "volume", "center_height", "gas"}, optional
             Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
         r : array_like, optional
@@ -413,7 +428,12 @@ class Equilibrium:
         InputError
             For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
         SolveError
-            At a fold of what is held, where nothing has a derivative.
+            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+
+        Notes
+        -----
+        In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
+        border of the wrinkles passes a quadrature point.
 
         Examples
         --------
@@ -430,7 +450,7 @@ class Equilibrium:
         return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
-        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        """The membrane in space with its verdicts, for notebooks; a still picture with numbers where scripts are not allowed."""
         return door.equilibrium_html(self)
 
 

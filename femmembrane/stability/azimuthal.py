@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import choice, whole
 from ..discretization.space import Space
@@ -27,6 +28,9 @@ from .second_variation import pairs_of
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
 from .verdict import against, short_wave_verdict, slack_all_over, slack_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
+
+#: smallest eigenvalue at a located onset, over the terms that cancel in it
+_AT_ONSET = 1e-5
 
 
 @one_thread
@@ -47,7 +51,25 @@ def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigen
     if not operator.band.shape[1]:
         raise InputError("mesh.elements", 1, "one linear element has no unknowns with waves around the axis; two, or degree 2, are allowed")
     pencil = operator.pencil()
-    return smallest_of(pencil, pencil.block_iterations() if guess is None else guess)
+    found = smallest_of(pencil, pencil.block_iterations() if guess is None else operator.reduced(guess))
+    return found if operator.reduction is None else replace(found, mode=operator.expanded(found.mode))
+
+
+def onset_mode(potential: Potential, x: Array, pressure: float, n: int) -> tuple[NDArray[np.int64], Array]:
+    """The numbers of (a, c, b) at the nodes, and the coefficients of the mode with n waves around the axis that sets in at a state.
+
+    Raises
+    ------
+    InputError
+        Where none sets in.
+    SpectrumError
+    """
+    operator = azimuthal_operator(potential, x, pressure, n)
+    found = _smallest(operator, None)
+    if not abs(found.value) <= _AT_ONSET * operator.pencil().noise(found.mode)[0]:
+        message = f"states with {n} wave(s) around the axis are not computed from there, where none set in: the smallest eigenvalue is"
+        raise InputError("start", "azimuthal_onset", f"{message} {found.value:.3g}; a special point of a branch of this scene is allowed")
+    return operator.numbering, found.mode
 
 
 @one_thread
@@ -81,7 +103,7 @@ def lowest_eigenvalues(
     operator = azimuthal_operator(potential, x, pressure, n)
     size = operator.band.shape[1]
     count = whole("count", count, most=size - 2)
-    constraint = potential.evaluate(x, pressure).volume_gradient if n == 0 and control == "volume" else None
+    constraint = operator.reduced(potential.evaluate(x, pressure).volume_gradient) if n == 0 and control == "volume" else None
     return [(value, mode) for value, mode, _ in lowest_of(operator.pencil(constraint), count)]
 
 

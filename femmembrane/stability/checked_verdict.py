@@ -150,7 +150,7 @@ def _finer_verdict(
         return None
     finer = found.evaluation.potential
     try:
-        better = ask(finer, found.x, found.pressure, found.evaluation)
+        better = ask(finer, found.evaluation.x, found.pressure, found.evaluation)
     except SpectrumError:
         return None
     if better.coefficients is None:

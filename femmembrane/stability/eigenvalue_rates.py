@@ -85,9 +85,8 @@ def eigenvalue_rates(
     extra = np.zeros(len(known.names))
     if gas is not None and compliance is not None:
         q = -along / compliance
-        names = known.names
-        room = rates.volume + np.array([float(name == "chamber.volume") for name in names])
-        push = rates.pressure + np.array([float(name == "chamber.atmosphere") for name in names])
+        room = rates.volume + known.through("chamber.volume")
+        push = rates.pressure + known.through("chamber.atmosphere")
         total, absolute = eq.volume + gas.chamber, eq.pressure + gas.atmosphere
         extra = -((along / compliance) ** 2) * (room / absolute - total / absolute**2 * push)
     if evaluation.spring is not None or eq.scene.bending:

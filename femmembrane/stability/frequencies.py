@@ -66,12 +66,13 @@ def natural_frequencies(
         found = lowest_eigenvalues(potential, x, pressure, n, count, control)
     except SpectrumError as error:
         raise SolveError(f"no natural frequencies: {error}", status=Status.NOT_CONVERGED) from error
-    constraint = evaluation.volume_gradient if n == 0 and control == "volume" else None
+    constraint = operator.reduced(evaluation.volume_gradient) if n == 0 and control == "volume" else None
     pencil = operator.pencil(constraint)
     shape = partial(_shape_at_nodes, potential, operator.n)
     vibrations = []
     for _, mode in found:
         value, error_bound = pencil.quotient(mode, pencil.times_mass(mode))
+        mode = operator.expanded(mode)
         mode.flags.writeable = False
         vibrations.append(Vibration(value, error_bound, operator.n, None if n else control, mode, shape))
     return tuple(vibrations)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -52,7 +53,9 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
+    guess = None if guess is None else evaluation.reduced(guess)
     found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, soft), guess)
+    found = replace(found, mode=evaluation.expanded(found.mode))
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode, bending)
@@ -63,7 +66,8 @@ def axisymmetric_pencil(
     potential: Potential, evaluation: Evaluation, bending: Bending | None, constraint: Array | None, compliance: float
 ) -> Pencil:
     """K - lambda M of axisymmetric perturbations, with bending if given."""
-    band, mass, kd = evaluation.band, potential.mass, potential.space.half_bandwidth
+    band, mass, kd = evaluation.band, evaluation.reduced_mass(potential.mass), potential.space.half_bandwidth
+    constraint = None if constraint is None else evaluation.reduced(constraint)
     if bending is not None:
         band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
     return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, evaluation.spring)

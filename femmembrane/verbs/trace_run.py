@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
+
+import numpy as np
 
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
@@ -17,6 +19,7 @@ from ..results.special_point import SpecialPoint
 from ..scene import ALL, Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
+from ..solve.active_set import contact_events
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
@@ -35,6 +38,11 @@ from .state_records import OnStep, predictor_of, record, remembered, restore, re
 
 #: most numbers of waves that are tried one after the other for the first onset of all
 _MOST_WAVES = 20
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
+
+#: first and smallest steps are shorter where a body is nearer to the membrane at rest than its size over this
+_ROOM = 10.0
 
 Start: TypeAlias = float | Equilibrium | SpecialPoint | Branch | None
 
@@ -200,7 +208,12 @@ class TraceRun(Run[Branch]):
         if GAS in request.targets:
             gas_of(scene, "until")
         self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
-        self.tracer = Tracer(Predictor(), request.steps.first, request.steps)
+        steps = request.steps
+        if self.potential.obstacles:  # a body next to the membrane at rest leaves it that much room
+            space, rest = self.potential.space, np.zeros(self.potential.space.n_free)
+            room = min(1.0, _ROOM * cast("ContactPotential", self.potential).touching(rest) / space.unit)
+            steps = replace(steps, first=steps.first * room, smallest=steps.smallest * room)
+        self.tracer = Tracer(Predictor(), steps.first, steps)
         self.special: list[SpecialPoint] | None = [] if request.special_points else None
         self.regular = self.made = 0
         self.unexplained: list[str] = []
@@ -376,7 +389,7 @@ class TraceRun(Run[Branch]):
         with self.timed("special_points"):
             located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
             crossed = self.crossed(segment)
-            for fold in sorted(located + crossed, key=lambda f: f.point.sigma):
+            for fold in sorted(located + crossed + contact_events(segment), key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
             return self.closing(segment, crossed, last)
@@ -417,7 +430,10 @@ class TraceRun(Run[Branch]):
 
     def _onset(self, segment: Segment[BranchPoint], n: int, low: float, top: float, guess: Array | None = None) -> SpecialPoint:
         def eigenvalue(point: BranchPoint) -> float:
-            return azimuthal_eigenvalue(self.potential_at(point), point.state.x, point.state.pressure, n, guess).value
+            potential, own = self.potential_at(point), point.state.evaluation
+            if potential.obstacles:
+                potential = own.potential
+            return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
 
         return self._special(segment.root("azimuthal_onset", eigenvalue, low, top), n)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quantities import Units, axis_label, caption
-from .branch_lines import MARKERS, answer, draw_branch
+from .branch_lines import MARKERS, after, answer, draw_branch
 from .figures import (
     AMONG,
     BOTH,
@@ -47,6 +47,7 @@ __all__ = [
     "UNSTABLE",
     "VOLUME_ONLY",
     "Style",
+    "after",
     "answer",
     "draw_branch",
     "draw_legend",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ...scene import Scene
     from ..branch import Branch
     from ..equilibrium import Equilibrium
+    from ..special_point import SpecialPoint
 
 #: controls whose verdicts are printed of a scene that asks for none
 _PRINTED = ("pressure", "volume")
@@ -72,6 +73,18 @@ class Verdicts(EquilibriumAnalysis):
 
     def point_columns(self, scene: Scene) -> Sequence[str]:
         return ("azimuthal",) if scene.analysis.azimuthal_modes else ()
+
+    def found_columns(self, points: Sequence[SpecialPoint]) -> Sequence[str]:
+        return ("postbuckling", "postbuckling_coefficient") if any(point.azimuthal for point in points) else ()
+
+    def point_value(self, point: SpecialPoint, column: str) -> Cell:
+        """Of other points than azimuthal onsets there is nothing after."""
+        if column == "azimuthal":
+            return point.azimuthal
+        after = point.postbuckling if point.azimuthal else None
+        if column == "postbuckling":
+            return after.kind if after else ""
+        return after.coefficient if after else np.nan
 
     # --- files
 

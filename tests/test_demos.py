@@ -21,6 +21,7 @@ QUICK = {
     "sweep.py": ["--quick"],
     "verdict_cost.py": ["--quick"],
     "wrinkle_numbers.py": ["--quick"],
+    "fit_coverage.py": ["--quick"],
     "cost.py": ["--quick", "--growth"],
 }
 

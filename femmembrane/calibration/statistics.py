@@ -115,7 +115,7 @@ def profile_intervals(
     for k in which:
         if k in estimate.on_bound or not np.isfinite(spread.errors[k]) or problem.law.has_edge(k):
             continue
-        sides = [_Side(problem, estimate, spread, k, sign, half) for sign in (-1.0, 1.0)]
+        sides = [Side(problem, estimate, spread, k, sign, half) for sign in (-1.0, 1.0)]
         heights = [side.height(half) for side in sides]
         if all(abs(height - 1) < _CURVED for height in heights):
             continue
@@ -126,7 +126,7 @@ def profile_intervals(
     return found, followed
 
 
-class _Side:
+class Side:
     """One side of the profile of a number."""
 
     def __init__(self, problem: Problem, estimate: Estimate, spread: Spread, k: int, sign: float, half: float) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..files import replace_file
+from ..results.fit import percent
 from .backend import title_text
 from .figures import save_figure, shown_figure
 from .html import pairs, table
@@ -54,7 +55,7 @@ def _title(fit: Fit) -> str:
     for name, value in fit.values.items():
         error, unit = fit.standard_errors[name], f" {fit.units[name]}" if fit.units[name] else ""
         size = abs(error / value) if value else np.inf
-        spread = f" ± {100 * size:.2g} %" if size < 10 else ""
+        spread = f" ± {percent(size)}" if size < 10 else ""
         parts.append(f"{name.removeprefix('material.')} = {value:.4g}{unit}{spread}")
     return ", ".join(parts)
 
@@ -148,7 +149,7 @@ def _sections(fit: Fit, svg: str) -> Iterator[tuple[str, str]]:
     rows = []
     for name in fit.parameters:
         value, error, (low, high) = fit.values[name], fit.standard_errors[name], fit.intervals[name]
-        relative = f"{100 * error / abs(value):.2g} %" if value and error < 10 * abs(value) else "not determined"
+        relative = percent(error / abs(value)) if value and error < 10 * abs(value) else "not determined"
         kind = "profile likelihood" if name in fit.profiled else "linearised"
         rows.append([f"{name}{f' ({fit.units[name]})' if fit.units[name] else ''}", value, relative, low, high, kind])
     yield "Numbers", table(["number", "value", "standard error", "from", "to", "95 % interval"], rows)

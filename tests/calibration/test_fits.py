@@ -424,6 +424,15 @@ def test_models_side_by_side():
     assert len(str(compared).splitlines()) == 5
 
 
+def test_data_sets_that_are_drawn():
+    """Their numbers scatter by the standard errors, which 200 of them know to 10 % at twice their own."""
+    found = fm.fit(scene(fm.NeoHookean()), gent_data(), ["material.mu"], noise="1 %", samples=200)
+    drawn = found.samples["material.mu"]
+    assert drawn.shape == (200,)
+    assert drawn.std() == pytest.approx(found.standard_errors["material.mu"], rel=0.15)
+    assert drawn.mean() == pytest.approx(found.values["material.mu"], abs=4 * found.standard_errors["material.mu"] / np.sqrt(200))
+
+
 def test_exact_log_likelihood():
     """Of normal errors with known deviations."""
     found = fm.fit(scene(fm.Gent(30.0)), gent_data(), ["material.mu"], noise={"pressure": 0.02}, intervals="linear")

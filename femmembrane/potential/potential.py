@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
+#: change of the factor on a voltage or a charge from which a derivative is taken
+_LITTLE_AHEAD = 1e-5
+
+
 class Evaluation:
     """Value, gradient and Hessian of E and V at one state x; energies and volume with the 2 pi.
 
@@ -219,7 +223,7 @@ class Potential:
     ----------
     scene : Scene
     quadrature : int, optional
-        Polynomial degree integrated exactly; default 2 degree + 1.
+        As for :class:`.Space`.
 
     Attributes
     ----------
@@ -316,6 +320,18 @@ class Potential:
     def prestressed(self) -> bool:
         """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
         return bool(getattr(self.scene.material, "prestressed", False))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether forces at a state are linear in the factor on sources and loads: those of a charge on electrodes are not, nor where the
+        field changes the width of wrinkles or the thickness."""
+        return self.electric is None or not (self.charged or self.scene.tension_field or hasattr(self.scene.material, "electrified"))
+
+    def factor_derivative(self, evaluation: Evaluation, pressure: float, factor: float) -> Array:
+        """Derivative of the gradient at a state with respect to the factor on sources and loads."""
+        ahead = 1.0 if self.linear else _LITTLE_AHEAD  # where it is linear that is exact
+        difference: Array = self.evaluate(evaluation.x, pressure, factor + ahead).gradient - evaluation.gradient
+        return difference / ahead
 
     @cached_property
     def electric(self) -> Electric | None:

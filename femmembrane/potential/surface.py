@@ -26,6 +26,7 @@ import numpy as np
 from ..kernels.interface import Array
 from ..physics.kinematics import hencky_strains
 from ..physics.loads import over_projection, over_reference
+from ..physics.magnetics import Source
 from ..physics.magnetisation import position_energy_density
 from ..physics.response import response_of
 from ..threads import cached_property
@@ -40,6 +41,10 @@ ORDER = 4
 #: difference of the logarithmic strains below which W is interpolated in y, at so many places: with the nearest singularity at y = -1 the
 #: error of the interpolant is that of round-off
 _CLOSE, _PLACES = 0.2, 8
+#: distance between places for differences, over that from the sources, and weights of the places from -3 to 3
+_STEP = 0.02
+_FIRST = (-1 / 60, 3 / 20, -3 / 4, 0.0, 3 / 4, -3 / 20, 1 / 60)
+_SECOND = (1 / 90, -3 / 20, 3 / 2, -49 / 18, 3 / 2, -3 / 20, 1 / 90)
 #: exponents of the Taylor coefficients of a function of two numbers
 EXPONENTS = tuple((i, k - i) for k in range(ORDER + 1) for i in range(k, -1, -1))
 #: local variables: the position, A and B, each in (e_r, e_theta, e_z)
@@ -144,7 +149,44 @@ class Expansions:
     def position(self, rho: Array, eta: Array) -> tuple[Array, Array]:
         """Coefficients of m in (r, z) by :data:`EXPONENTS`, and of g in z, shapes (15, ...) and (5, ...)."""
         found = at_points(self._position, rho, eta).reshape(-1, *rho.shape)
-        return found[: len(EXPONENTS)], found[len(EXPONENTS) :]
+        position, projected = found[: len(EXPONENTS)], found[len(EXPONENTS) :]
+        if self._written_out:
+            position = self._from_second_derivatives(rho, eta)
+        return position, projected
+
+    @property
+    def _written_out(self) -> bool:
+        """Whether a source has its derivatives written out up to the second, since formulas of more would be too long."""
+        return any(type(source).jet is not Source.jet for source in self._potential.sources)
+
+    def _from_second_derivatives(self, rho: Array, eta: Array) -> Array:
+        """The coefficients of m with differences of its exact second derivatives, of the sixth order in a part of the distance to the
+        sources; m is even in the radius."""
+        potential = self._potential
+        away = [source.singular_squared(rho, eta) for source in potential.sources]
+        step = _STEP * np.minimum(np.sqrt(np.min(away, axis=0)), potential.space.size)
+        at = {}
+        for k in range(-3, 4):
+            for i, j in ((k, 0), (0, k)):
+                r = rho + i * step
+                found = potential.field_energy(np.abs(r), eta + j * step).reshape(6, *rho.shape)
+                at[i, j] = (found, found[3], np.sign(r) * found[4], found[5])
+
+        def differences(part: int, along: int) -> tuple[Array, Array]:
+            """First and second derivative of a second derivative (rr, rz or zz) along r or z."""
+            f = [at[(k, 0) if along == 0 else (0, k)][part] for k in range(-3, 4)]
+            first = sum(c * v for c, v in zip(_FIRST, f, strict=True)) / step
+            second = sum(c * v for c, v in zip(_SECOND, f, strict=True)) / step**2
+            return np.asarray(first), np.asarray(second)
+
+        here = at[0, 0][0]
+        known = {(0, 0): here[0], (1, 0): here[1], (0, 1): here[2], (2, 0): here[3] / 2, (1, 1): here[4], (0, 2): here[5] / 2}
+        (rrr, rrrr), (rrz, rrzz) = differences(1, 0), differences(1, 1)
+        (rzz, _), (zzz, zzzz) = differences(3, 0), differences(3, 1)
+        rrrz, rzzz = differences(2, 0)[1], differences(2, 1)[1]
+        known |= {(3, 0): rrr / 6, (2, 1): rrz / 2, (1, 2): rzz / 2, (0, 3): zzz / 6}
+        known |= {(4, 0): rrrr / 24, (3, 1): rrrz / 6, (2, 2): rrzz / 4, (1, 3): rzzz / 6, (0, 4): zzzz / 24}
+        return np.stack([known[pair] for pair in EXPONENTS])
 
     @cached_property
     def _apart(self) -> ca.Function:
@@ -186,7 +228,7 @@ class Expansions:
         potential, y = self._potential, ca.SX.sym("y", 2)
         with casadi_answers_numpy():
             density = over_reference(potential.loads, y[0], y[1]) + ca.SX(0)
-            if potential.sources:
+            if potential.sources and not self._written_out:
                 scene = potential.scene
                 density += position_energy_density(potential.sources, scene.susceptibility or 0.0, scene.saturation, y[0], y[1])
             rows = taylor(density, y[0], y[1])

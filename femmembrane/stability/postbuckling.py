@@ -31,16 +31,17 @@ from ..solve.banded import BandFactor, BorderedFactor
 from ..solve.controls import Gas
 from ..threads import one_thread
 from .azimuthal import _smallest
-from .azimuthal_operator import azimuthal_operator
+from .azimuthal_operator import AzimuthalOperator, azimuthal_operator
 from .rigid_motions import pencil_of
-from .spectrum import SpectrumError
+from .second_variation import pairs_of
+from .spectrum import Pencil, SpectrumError
 from .wave_unknowns import wave_unknowns
 
 #: angles at which the potential is evaluated, as shares of half a wave
 _ANGLES = (np.arange(3) + 0.5) / 3
-#: an eigenvalue this small beside the terms that cancel in it is zero; and one of the mesh of another number of waves may be
-_ZERO, _NEAR = 1e-6, 1e-4
-#: and the same for a coupling that vanishes by a symmetry
+#: an eigenvalue this small beside the terms that cancel in it may be zero at the same point, on another mesh or beyond its error
+_NEAR = 1e-3
+#: a coupling this small beside the terms that cancel in it vanishes by a symmetry
 _UNCOUPLED = 1e-4
 
 
@@ -77,11 +78,19 @@ class _Onset:
         operator = azimuthal_operator(potential, x, pressure, n)
         pencil = operator.pencil()
         found = _smallest(operator, None)
-        self.scale = pencil.noise(found.mode)[0]
+        self.scale = _terms(self.space, operator, found.mode)
         self.mode = found.mode * np.sqrt(2)  # mass 1 over the surface, where the operator has 2 pi in place of pi
-        near = abs(found.value) + _ZERO * self.scale
-        if pencil.count(near) - pencil.count(-near) > 1:
-            raise SpectrumError(f"two modes with n = {n} set in at once, and act on each other")
+        self._alone(pencil, n, abs(found.value))
+        for other in (n - 1, n + 1):
+            if other and other != 2 * n:
+                self._alone(azimuthal_operator(potential, x, pressure, other).pencil(), other)
+
+    def _alone(self, pencil: Pencil, n: int, own: float = 0.0) -> None:
+        """Refuse an onset at which another mode sets in as well: amplitudes then act on each other, and one coefficient says too little."""
+        near = own + _NEAR * self.scale
+        if pencil.count(near) - pencil.count(-near) > int(n == self.n):
+            pair = f"two modes with n = {n}" if n == self.n else f"modes with n = {self.n} and n = {n}"
+            raise SpectrumError(f"{pair} set in at once, and act on each other")
 
     def answer(self, gas: Gas | None) -> Postbuckling:
         space = self.space
@@ -106,8 +115,15 @@ class _Onset:
             slope = float(force @ tangent) - rate * bend
             if gas is not None and control == "gas":
                 slope /= self.pressure + gas.atmosphere  # the amount changes by so much for each unit of volume
-            under[control] = Reduced(rest + float(force @ w) / 4 - p * bend / 4, slope)
+            under[control] = Reduced(rest + float(force @ w) / 4 - p * bend / 4, slope, self._negative(evaluation, control, gas))
         return Postbuckling(self.n, "", under)
+
+    def _negative(self, evaluation: Evaluation, control: str, gas: Gas | None) -> int:
+        """Number of axisymmetric perturbations in which the energy falls; that of a pear that is at its own onset counts as none."""
+        row = None if control == "pressure" else evaluation.volume_gradient
+        softness = gas.compliance(evaluation.volume) if gas is not None and control == "gas" else 0.0
+        held = pencil_of(evaluation.band, self.potential.mass, self.space.half_bandwidth, row, softness, None)
+        return held.count(-_NEAR * self.scale)
 
     def _doubled(self, third: Array) -> float:
         """r . K^-1 r with r = U3[f, f, .] in displacements of 2n waves, K their second variation over 2 pi in place of pi."""
@@ -119,26 +135,32 @@ class _Onset:
         slopes = np.stack([even[3], odd[4], even[5]])
         values = np.stack([even[0] + even[7] - n * odd[6], odd[1] - odd[6] + n * even[7], even[2] - n * odd[8]])
         force = layout.integrate(values, slopes)
-        pencil = operator.pencil()
-        if pencil.count(_ZERO * self.scale) != pencil.count(-_ZERO * self.scale):
-            raise SpectrumError(f"a mode with n = {n} sets in at the same point, and takes part")
+        self._alone(operator.pencil(), n)
         return float(force @ BandFactor(operator.band).solve(force))
 
     def _regular(self, evaluation: Evaluation, force: Array, size: Array) -> BandFactor | SpringFactor:
-        """Factors of K for displacements without waves. Where one of them is at its own onset, as on a sphere, whose pears point anywhere,
-        and no force acts on it, it is left out.
+        """Factors of K for displacements without waves. On a sphere, whose pears point anywhere, one of them is at its own onset; no force
+        acts on it, and it is left out.
         """
         space, factor = self.space, BandFactor.of(evaluation)
         pencil = pencil_of(evaluation.band, self.potential.mass, space.half_bandwidth, evaluation.volume_gradient, 0.0, None)
-        near = _NEAR * self.scale
-        if pencil.count(near) == pencil.count(-near):
-            return factor
-        soft = pencil.inverse_iterations(0.0)
-        if abs(force @ soft) <= _UNCOUPLED * float(size @ np.abs(soft)):
+        try:
+            self._alone(pencil, 0)
+        except SpectrumError:
+            soft = pencil.inverse_iterations(0.0)
+            if self.n > 1 or not space.spins or abs(force @ soft) > _UNCOUPLED * float(size @ np.abs(soft)):
+                raise
             return SpringFactor(factor, np.sqrt(self.scale) * pencil.times_mass(soft))  # type: ignore[arg-type]
-        if pencil.count(_ZERO * self.scale) != pencil.count(-_ZERO * self.scale):
-            raise SpectrumError("an axisymmetric mode sets in at the same point, and takes part")
         return factor
+
+
+def _terms(space: Space, operator: AzimuthalOperator, mode: Array) -> float:
+    """Sum of the sizes of the terms that cancel in the second variation along a mode, at the points: what a small eigenvalue is beside."""
+    layout = wave_unknowns(space, min(operator.n, 2))
+    table = space.table[: 2 * space.n_quadrature, : space.degree + 1]
+    local = (table @ layout.local(mode).reshape(3, space.degree + 1, -1)).reshape(6, *space.R.shape)
+    pairs = zip(operator.density, pairs_of(operator.density), strict=True)
+    return float(sum(np.abs(row * local[i] * local[j]).sum() * (1 if i == j else 2) for row, (i, j) in pairs))
 
 
 def _displaced(space: Space, n: int, mode: Array) -> Array:

@@ -479,3 +479,85 @@ def test_sensitivities_of_eigenvalues_have_bending(against: dict[str, Any]) -> N
 
     step = 0.5
     assert found == pytest.approx((value(400 + step) - value(400 - step)) / (2 * step), rel=1e-4)
+
+
+# --- a pressurised sphere under a point force
+
+#: R0/T does not matter for the state: P = p R/(mu T), Y = 3 mu T, l_p = R sqrt(p R/Y)
+SPHERE_PRESSURE = 0.003
+REACH = np.sqrt(SPHERE_PRESSURE / 3)
+#: force over 2 pi p l_p^2 at which the hoop stress is first compressive: from the equations of shallow shells without bending
+FIRST_COMPRESSION = 0.5693691877
+
+
+def pushed_sphere(forces: list[float], **changes: Any) -> fm.Branch:
+    """One half of a sphere between two opposite forces on small discs, 0.02 l_p in radius, at the pressure above."""
+    unit, hub, count = 2 * np.pi * SPHERE_PRESSURE * REACH**2, 0.02 * REACH, 40
+    angle = np.geomspace(hub + 0.3 * REACH, np.pi / 2 + 0.3 * REACH, 2 * count + 1) - 0.3 * REACH
+    points = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    points[-1] = (1.0, 0.0)
+    cells = [[2 * k, 2 * k + 2, 2 * k + 1] for k in range(count)]
+    mesh = fm.meridian_from_points(points, cells, first="hub", last="mirror")
+    loads = [fm.HubForce(-forces[0] * unit)]
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=mesh, degree=4, loads=loads, **changes)
+    return fm.vary(scene, "load.0.force", [-force * unit for force in forces], hold={"pressure": SPHERE_PRESSURE})
+
+
+def test_a_pushed_sphere_is_first_compressed() -> None:
+    """Within 0.6 %: the sphere is not quite shallow, its disc no point, and it is stretched."""
+    branch = pushed_sphere([0.1, 0.3, 0.5, 0.994 * FIRST_COMPRESSION, 1.006 * FIRST_COMPRESSION])
+    least = [eq.profile()["mechanical_stress_2"].min() for eq in branch[-2:]]
+    assert least[0] > 0 > least[1]
+
+
+def test_the_wrinkles_of_a_pushed_sphere() -> None:
+    """n ~ T^(-2/3) and F - F_c ~ T^(2/3) at the onset, where a compressed zone has just opened: with s_2 ~ d and its width L ~ sqrt(d),
+    d = F - F_c, the onset is at s_2 = 2 sqrt(s_1 B) pi/L, so that d^3 ~ B, and k_2 = (s_1 pi^2/(B L^2))^(1/4) ~ B^(-1/3).
+
+    The factors, 210 and 0.0104, were recorded on 2026-11-28 from onsets at T = 1e-5, 3e-6 and 1e-6.
+    """
+    for thickness in (1e-5, 1e-6):
+        shift, number = 210 * thickness ** (2 / 3), 0.0104 * thickness ** (-2 / 3)
+        forces = [FIRST_COMPRESSION + part * shift for part in (0.85, 1.12)]
+        branch = pushed_sphere([0.1, 0.3, 0.5, *forces], bending=True, radius_to_thickness=1 / thickness)
+        numbers = [round(number * part) for part in (0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 2.0)]
+        below, above = ([azimuthal_eigenvalue(eq.potential, eq.state, eq.pressure, n).value for n in numbers] for eq in branch[-2:])
+        assert min(below) > 0 > min(above)
+        assert abs(int(np.argmin(above)) - 4) <= 2
+
+
+SHAPES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
+    "sphere": ({"mesh": fm.sphere(12)}, {"volume": 6.0}),
+    "torus": ({"mesh": fm.torus(aspect=3.0, elements=16)}, {"pressure": 0.5}),
+    "hub and mirror": ({"mesh": fm.cylinder(length=2.0, elements=12, top="hub", bottom="mirror")}, {"volume": 8.0}),
+    "free edge": ({"mesh": fm.annulus(0.3, 12, inner="free")}, {"volume": 0.5}),
+    "charge": ({"mesh": fm.disc(12), "electric": fm.Electric(total_charge=0.5)}, {"volume": 1.0}),
+    "self-field": (
+        {"mesh": fm.disc(12), "sources": [fm.Dipole(20.0, 2.5)], "susceptibility": 1.0, "demagnetization": True},
+        {"volume": 0.8},
+    ),
+    "uneven": ({"mesh": fm.disc(12), "thickness": "1 - 0.4*R**2"}, {"volume": 0.5}),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_shape_and_effect_bends(name: str) -> None:
+    """Bending raises every eigenvalue, by nearly nothing where the sheet is thin."""
+    arguments, load = SHAPES[name]
+    plain = fm.Scene(material=fm.NeoHookean(), degree=3, **arguments)
+    without = fm.equilibrium(plain, **load)
+    for ratio, most in ((1e4, 1e-3), (30.0, 0.5)):
+        eq = fm.equilibrium(plain.replace(bending=True, radius_to_thickness=ratio), **load)
+        for asked in ({"control": "pressure"}, {"azimuthal": 1}, {"azimuthal": 3}):
+            before, after = (state.verdict(**asked).smallest_eigenvalue for state in (without, eq))  # type: ignore[arg-type]
+            assert -1e-9 < after / before - 1 < most
+
+
+def test_a_sphere_bends_alike_in_all_directions() -> None:
+    """Harmonics of one degree have one eigenvalue, whatever their number of waves around the axis: 2 for the lowest, 3 for n = 3."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.sphere(16), degree=4, bending=True, radius_to_thickness=10.0)
+    eq = fm.equilibrium(scene, volume=6.0)
+    values = [eq.verdict("volume").smallest_eigenvalue, *(eq.verdict(azimuthal=n).smallest_eigenvalue for n in (1, 2))]
+    assert values == pytest.approx([values[0]] * 3, rel=1e-6)
+    plain = fm.equilibrium(scene.replace(bending=False), volume=6.0)
+    assert values[0] > 1.002 * plain.verdict("volume").smallest_eigenvalue

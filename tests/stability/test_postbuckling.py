@@ -169,6 +169,8 @@ def test_what_is_not_known_is_said(tipped: fm.SpecialPoint) -> None:
     assert "not known" in found.words
     sloped = potential_of(eq.scene.replace(demagnetization=True))
     assert "slope" in postbuckling(sloped, eq.state, eq.pressure, 1).reason
+    bent = potential_of(eq.scene.replace(bending=True, radius_to_thickness=1000.0))
+    assert "bending" in postbuckling(bent, eq.state, eq.pressure, 1).reason
     charged = potential_of(eq.scene.replace(electric=fm.Electric(total_charge=0.1)))
     assert "total charge" in postbuckling(charged, eq.state, eq.pressure, 1).reason
 
@@ -177,8 +179,18 @@ def test_two_modes_at_once_are_refused(tipped: fm.SpecialPoint, monkeypatch: pyt
     eq = tipped.equilibrium
     from femmembrane.stability import postbuckling as module
 
-    monkeypatch.setattr(module, "_ZERO", 1.0)  # all that is softer than the terms of the mode counts as zero
+    monkeypatch.setattr(module, "_NEAR", 1.0)  # all that is softer than the terms of the mode counts as zero
     assert "two modes with n = 1" in postbuckling(eq.potential, eq.state, eq.pressure, 1).reason
+
+
+def test_a_sphere_with_all_its_modes_of_one_degree_at_once_is_refused() -> None:
+    # its second-degree modes with n = 0, 1, 2 set in together, and have a cubic term; so do those of the third degree, without one
+    scene = fm.Scene(material=fm.Varga(), mesh=fm.sphere(12), degree=4, analysis=fm.Analysis(azimuthal_modes=(1, 2, 3)))
+    found = {p.azimuthal: p for p in fm.trace(scene, until={"volume": 60.0}).special_points or () if p.azimuthal}
+    assert found[1].postbuckling.kind == "subcritical"  # pears of one direction are as good as those of any other
+    for n in (2, 3):
+        assert found[n].postbuckling.kind == "unknown"
+        assert f"modes with n = {n} and n = {n - 1} set in at once" in found[n].postbuckling.reason
 
 
 def test_only_onsets_have_a_coefficient() -> None:

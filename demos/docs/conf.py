@@ -13,6 +13,7 @@ sys.path.insert(0, str(HERE))
 import demo_pages  # noqa: E402
 import repository_pages  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
+from sphinx.domains.python import PyObject  # noqa: E402
 
 import femmembrane  # noqa: E402
 
@@ -70,6 +71,9 @@ html_show_sphinx = False
 
 
 def setup(app: Sphinx) -> None:
+    for field in PyObject.doc_field_types:
+        if field.name == "variable":
+            field.label = "Attributes"  # the word of the docstrings
     app.connect("config-inited", lambda app, config: repository_pages.generate(HERE, RUN), priority=1)
     app.connect("source-read", repository_pages.include)
     app.connect("autodoc-process-docstring", repository_pages.escape, priority=1)

@@ -126,7 +126,7 @@ def included() -> dict[Path, Path]:
 
 
 def include(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Puts the text of an included page in its place, with links that lead to where the documentation has what they name."""
+    """Puts the text of an included page in its place, and has links lead to where the documentation shows what they name."""
     page = Path(app.env.doc2path(docname))
     if page.suffix != ".md":
         return
@@ -143,7 +143,8 @@ def include(app: Sphinx, docname: str, source: list[str]) -> None:
             text = text.split("\n" + options["end-before"], 1)[0]
         return adapted(text, path, page.parent, pages)
 
-    source[0] = INCLUDE.sub(text_of, source[0])
+    # links of the pages here lead to the pages of the repository, as whoever reads them there needs it
+    source[0] = INCLUDE.sub(text_of, adapted(source[0], page, page.parent, pages))
 
 
 def adapted(text: str, page: Path, folder: Path, pages: dict[Path, Path]) -> str:

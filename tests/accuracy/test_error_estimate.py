@@ -374,7 +374,7 @@ def test_profiles_and_stresses_at_the_ends(scene, volume):
     assert estimate.displacement.error == pytest.approx(rms, rel=0.3)
     for k, name in ((0, "stress_first"), (-1, "stress_last")):
         true = eq.profile()["mechanical_stress_1"][k] - best.profile()["mechanical_stress_1"][k]
-        assert 0.4 * abs(true) < abs(getattr(estimate, name).error) < 2 * abs(true)
+        assert 0.5 * abs(true) < abs(getattr(estimate, name).error) < 2 * abs(true)
 
 
 def test_an_older_file_has_fewer_estimates():

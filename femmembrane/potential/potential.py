@@ -190,7 +190,7 @@ class Potential:
     ----------
     scene : Scene
     quadrature : int, optional
-        Polynomial degree integrated exactly; default 2 degree + 1.
+        As for :class:`.Space`.
 
     Attributes
     ----------

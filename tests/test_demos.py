@@ -16,7 +16,14 @@ from femmembrane.scene import Scene
 
 DEMOS = Path(__file__).parents[1] / "demos"
 #: options that make a demo quick enough for every test run; without an entry it is run whole
-QUICK = {"timings.py": ["--quick"], "sweep.py": ["--quick"], "verdict_cost.py": ["--quick"], "cost.py": ["--quick", "--growth"]}
+QUICK = {
+    "timings.py": ["--quick"],
+    "sweep.py": ["--quick"],
+    "verdict_cost.py": ["--quick"],
+    "wrinkle_numbers.py": ["--quick"],
+    "fit_coverage.py": ["--quick"],
+    "cost.py": ["--quick", "--growth"],
+}
 
 
 @pytest.mark.parametrize("script", sorted(path.name for path in DEMOS.glob("*.py")))

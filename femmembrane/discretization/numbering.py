@@ -29,7 +29,8 @@ class Numbering:
     mesh : Meridian
     degree : int
     quadrature : int, optional
-        Polynomial degree integrated exactly; default 2 degree + 1.
+        Polynomial degree integrated exactly; default 2 degree + 1. With 0 the points are both ends of each element: there a state is looked
+        at, and nothing is integrated well.
     anchored : frozenset of {"along", "shift", "tilt"}
         Rigid motions that something outside, such as a magnetic source, sees: along the axis, across it, and about a diameter. They are
         not free, and nothing is pinned for them.
@@ -114,7 +115,7 @@ class Numbering:
         line = skfem.MeshLine(self.ends)
         element = line_element(degree)
         local, n_nodes = meridian_order(line, element)
-        points, weights = get_quadrature(element, 2 * degree + 1 if quadrature is None else quadrature)
+        points, weights = _at_ends() if quadrature == 0 else get_quadrature(element, quadrature or 2 * degree + 1)
         self.n_elements, self.n_quadrature = line.nelements, points.shape[1]
         self.points: Array = points[0]
         self._quadrature: Array = weights
@@ -334,6 +335,11 @@ def band_of(gather: NDArray[np.int64], n_free: int) -> int:
     inside = gather < n_free
     low, high = np.where(inside, gather, n_free).min(axis=0), np.where(inside, gather, -1).max(axis=0)
     return int((high - low).max(initial=0))
+
+
+def _at_ends() -> tuple[Array, Array]:
+    """Both ends of the reference element, and weights."""
+    return np.array([[0.0, 1.0]]), np.array([0.5, 0.5])
 
 
 def _folded(n_nodes: int) -> NDArray[np.int64]:

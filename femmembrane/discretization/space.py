@@ -20,7 +20,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, shape_functions
+from .elements import lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -115,6 +115,10 @@ class Space(Numbering):
             return value, slope
         at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
         return value @ at_nodes, slope @ at_nodes
+
+    def second_derivatives(self, xi: Array) -> Array:
+        """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
+        return second_derivatives(self.degree, xi)
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""

@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
+#: change of the factor on a voltage or a charge from which a derivative is taken
+_LITTLE_AHEAD = 1e-5
+
+
 class Evaluation:
     """Value, gradient and Hessian of E and V at one state x; energies and volume with the 2 pi.
 
@@ -223,7 +227,7 @@ class Potential:
     ----------
     scene : Scene
     quadrature : int, optional
-        Polynomial degree integrated exactly; default 2 degree + 1.
+        As for :class:`.Space`.
 
     Attributes
     ----------
@@ -320,6 +324,18 @@ class Potential:
     def prestressed(self) -> bool:
         """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
         return bool(getattr(self.scene.material, "prestressed", False))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether forces at a state are linear in the factor on sources and loads: those of a charge on electrodes are not, nor where the
+        field changes the width of wrinkles or the thickness."""
+        return self.electric is None or not (self.charged or self.scene.tension_field or hasattr(self.scene.material, "electrified"))
+
+    def factor_derivative(self, evaluation: Evaluation, pressure: float, factor: float) -> Array:
+        """Derivative of the gradient at a state with respect to the factor on sources and loads."""
+        ahead = 1.0 if self.linear else _LITTLE_AHEAD  # where it is linear that is exact
+        difference: Array = self.evaluate(evaluation.x, pressure, factor + ahead).gradient - evaluation.gradient
+        return difference / ahead
 
     @cached_property
     def electric(self) -> Electric | None:
@@ -587,6 +603,11 @@ class Potential:
         return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
     @property
+    def field_operations(self) -> int:
+        """Number of elementary operations of :meth:`field_energy` at one point."""
+        return int(self._field_energy_function.n_instructions())
+
+    @property
     def tilts(self) -> bool:
         """Whether the magnetic energy depends on the slope of the meridian."""
         return self.magnetisation is not None and self.magnetisation.tilts
@@ -636,7 +657,8 @@ def _plain(scene: Scene) -> Scene:
     electric = scene.electricity
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
-    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
+    ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
+    plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
     return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
 
 

@@ -426,6 +426,25 @@ class Branch(Sequence[Equilibrium]):
         """
         door.write_report(self, path, units)
 
+    def explore(self, path: str | PathLike[str], *, units: str = "scaled") -> None:
+        """Write one HTML page on which the branch is explored: click a state to see it in space with its verdicts, modes and zones.
+
+        The page needs no network, and has all that it shows: 1 MB for 80 states, and 2 MB for the library that draws them.
+
+        Parameters
+        ----------
+        path : path
+        units : {"scaled", "si"}
+            As for :meth:`plot`.
+
+        Raises
+        ------
+        InputError
+            For an empty branch, a file that cannot be written, SI units of a scene without scales, and where Plotly is not installed
+            (``pip install "femmembrane[explore]"``).
+        """
+        door.write_explorer(self, path, units)
+
     def cite(self) -> str:
         """BibTeX of what the computation used."""
         from .citations import cite
@@ -433,5 +452,5 @@ class Branch(Sequence[Equilibrium]):
         return cite(self)
 
     def _repr_html_(self) -> str:
-        """The table and the pressure-volume diagram, for notebooks."""
+        """The branch to explore, for notebooks; a still picture with a table where scripts are not allowed or Plotly is not installed."""
         return door.branch_html(self)

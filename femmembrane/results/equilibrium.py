@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
-from ..scene import WRINKLING
+from ..scene import ALL, WRINKLING
 from ..scene.variation import Parameter
 from ..solve.controls import control_kind
 from ..solve.newton import relative_residual
@@ -249,15 +249,18 @@ class Equilibrium:
             space = self.potential.root.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
+    def verdict(
+        self, control: str | None = None, *, azimuthal: int | str = 0, gas: Gas | None = None, electric: str | None = None
+    ) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
         Parameters
         ----------
         control : {"pressure", "volume", "gas"}
             What is held against axisymmetric perturbations. Left out for azimuthal perturbations, which do not change the volume.
-        azimuthal : int
-            Number of waves around the axis; 0 for axisymmetric perturbations.
+        azimuthal : int or "all"
+            Number of waves around the axis; 0 for axisymmetric perturbations. With "all" the number whose smallest eigenvalue is the
+            lowest is looked for among all that can matter (``femmembrane.stability.worst_waves``); it is the ``azimuthal`` of the verdict.
         gas : Gas, optional
             For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found, or the amount in the chamber of
             the scene that holds it.
@@ -270,11 +273,10 @@ class Equilibrium:
         InputError
             For an unknown control, or for arguments that do not go together.
         """
-        if not (control is None or isinstance(control, str)) or not isinstance(azimuthal, (int, np.integer)):
+        counted = isinstance(azimuthal, (int, np.integer)) or (isinstance(azimuthal, str) and azimuthal == ALL)
+        if not (control is None or isinstance(control, str)) or not counted:
             raise InputError(
-                "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
-                control or azimuthal,
-                "a name and a number are allowed",
+                "control" if counted else "azimuthal", control or azimuthal, 'a name and a number are allowed, or azimuthal="all"'
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
@@ -311,7 +313,7 @@ class Equilibrium:
         return door.gas(amount, chamber.volume, chamber.atmosphere) if amount > 0 and self.volume > -chamber.volume else None
 
     @one_thread
-    def _judged(self, potential: Potential, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+    def _judged(self, potential: Potential, control: str | None, azimuthal: int | str, gas: Gas | None) -> Verdict:
         evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
         return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
@@ -357,11 +359,47 @@ class Equilibrium:
         return self.remembered(("zones", criterion), lambda: door.find_zones(self.scene, self.state, self.pressure, criterion))
 
     @one_thread
+    def on_borders(self, control: str = "volume") -> Equilibrium:
+        """The same equilibrium of a tension field on elements that end where its zones of wrinkles begin and end.
+
+        A border of a zone inside an element costs digits at any degree. The ends of elements nearest to the borders are moved there, as
+        many elements as before, and the equilibrium is corrected at the same load until both are at rest. Errors then fall at order 2 p
+        for elements of degree p, those of the borders as well. ``scene.mesh`` of what is returned has the new ends. Where there is no
+        border it is this equilibrium.
+
+        Parameters
+        ----------
+        control : {"volume", "pressure", "center_height"}
+            What is held.
+
+        Raises
+        ------
+        InputError
+            For a scene without a tension field, for an unknown control, and for a mesh with fewer elements than zones.
+        SolveError
+            For a slack membrane, and where the equilibrium is lost on the way, as next to a fold of what is held.
+
+        Examples
+        --------
+        >>> import femmembrane as fm
+        >>> ogden = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
+        >>> beside = {"sources": [fm.Dipole(strength=400.0, height=-3.75)], "susceptibility": 2.5, "tension_field": True}
+        >>> eq = fm.equilibrium(fm.Scene(material=ogden, mesh=fm.disc(16), degree=4, **beside), center_height=-0.3)
+        >>> borders = eq.on_borders().zones("mechanical").borders
+        >>> print(", ".join(f"{r:.6f}" for r in borders))
+        0.213730, 0.611444
+        """
+        kind = control_kind(control)
+        held = kind.at(kind.value(self.potential.space, self.state, self.pressure, self.volume))
+        return self.remembered(("on_borders", kind.name), lambda: door.on_borders(self, held))
+
+    @one_thread
     def error_estimate(self, control: str = "volume") -> ErrorEstimate:
         """Estimated discretisation errors, from the same load in a finer space; computed once and remembered.
 
         Some states have no estimate: compressed and slack ones, states too close to a fold in what is held, states on a mesh too coarse.
-        Their errors are NaN, and the record says why. In a wrinkled tension field the estimate is rough, a factor of two or so.
+        Their errors are NaN, and the record says why. In a wrinkled tension field the estimate is rough, a factor of two or so,
+        unless every border of a zone is an end of elements (:meth:`on_borders`).
 
         Parameters
         ----------
@@ -448,7 +486,7 @@ class Equilibrium:
         return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
-        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        """The membrane in space with its verdicts, for notebooks; a still picture with numbers where scripts are not allowed."""
         return door.equilibrium_html(self)
 
 

@@ -107,7 +107,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
     "mesh": ("degree",),
-    "effects": ("tension_field", "demagnetization"),
+    "effects": ("tension_field", "demagnetization", "bending"),
 }
 #: arguments of Electric whose keys are words that Python keeps for itself, or stand beside one
 ELECTRIC_KEYS = {"start": "from", "stop": "to"}

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from ..physics.along import Along
 from ..physics.chamber import Chamber
 from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
-from ..physics.magnetics import Source
+from ..physics.magnetics import Source, components
 from ..physics.materials import Material
 from ..physics.named import material_data
 from ..physics.obstacles import Obstacle
@@ -68,7 +68,7 @@ class Scene:
     susceptibility : float, optional
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source, unless there is a remanence.
     radius_to_thickness : float, optional
-        R0/T > 0; it enters the total stresses only. Left out: the ratio of the scales, or 1000 without scales.
+        R0/T > 0; it enters the total stresses, and bending. Left out: the ratio of the scales, or 1000 without scales.
     tension_field : bool
         Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
     title : str
@@ -102,6 +102,10 @@ class Scene:
         The chamber of gas behind the membrane, for runs by amounts of gas and verdicts at a held amount.
     electric : Electric, optional
         A voltage or a charge on the faces of the membrane. Without one nothing electric is built.
+    bending : bool
+        Whether verdicts count the bending stiffness of the sheet (:mod:`~femmembrane.stability.bending`), which chooses the number of
+        waves where the membrane is compressed. Equilibria do not change. It needs a ``radius_to_thickness`` that is given, by itself or by
+        scales, and elements of degree 2 or higher.
     obstacles : sequence of Obstacle
         Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
     borders : tuple of (int, float)
@@ -149,6 +153,9 @@ class Scene:
     remanence_transport: str | None = None
     chamber: Chamber | None = None
     electric: Electric | None = None
+    bending: bool = False
+    #: whether R0/T was given, by itself or by scales
+    _thickness_given: ClassVar[bool] = False
     obstacles: tuple[Obstacle, ...] = ()
     borders: tuple[tuple[int, float], ...] = field(default=(), repr=False, metadata={"found": True})
 
@@ -179,8 +186,11 @@ class Scene:
             _check_interface(item_path("obstacle", k, len(obstacles)), body, ("pieces", "touch", "facing"), allowed)
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _check_interface("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
+        bending = switch("effects.bending", self.bending)
+        object.__setattr__(self, "_thickness_given", self.radius_to_thickness is not None or self.scales is not None)
         store(
             self,
+            bending=bending,
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
             loads=loads,
@@ -197,6 +207,7 @@ class Scene:
         if self.tension_field and getattr(self.material, "prestressed", False):
             allowed = "false is allowed with a pre-stressed strain energy: its width without stress is not known"
             raise InputError("effects.tension_field", True, allowed)
+        self._check_bending()
         self._check_size()
         self._check_sheet()
         lift = lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
@@ -215,6 +226,19 @@ class Scene:
         gas = run is not None and (run.control == GAS or GAS in (run.hold or ()) or GAS in (run.until or ()))
         if self.chamber is None and (gas or GAS in self.analysis.stability):
             raise InputError("chamber", None, "missing; an amount of gas needs the volume of its chamber: give chamber.volume")
+
+    def _check_bending(self) -> None:
+        """Bending has the thickness it follows from, second derivatives, and a compression to act on."""
+        if not self.bending:
+            return
+        if not self._thickness_given:
+            message = "missing; bending follows from the thickness: give R0/T, or scales"
+            raise InputError("membrane.radius_to_thickness", None, message)
+        if self.tension_field:
+            allowed = "false is allowed with a tension field, which carries no compression that bending could resist"
+            raise InputError("effects.bending", True, allowed)
+        if not self.open and self.degree < 2:
+            raise InputError("mesh.degree", self.degree, "2 or more is allowed with bending: linear elements have no second derivatives")
 
     def _check_size(self) -> None:
         """Refuse a scene that the memory has no room for, before anything is built."""
@@ -265,7 +289,7 @@ class Scene:
             _check_interface(path, source, ("field", "jet", "intensity", "distance_squared", "passed", "meets", "sees", "refusal"), allowed)
             # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles and bodies may lie between them
             with np.errstate(all="ignore"):
-                finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
+                finite = all(np.all(np.isfinite(component)) for component in components(source, R, Z))
             touched = source.meets(R, Z)
             if touched or not finite:
                 name, reason = source.refusal
@@ -370,7 +394,7 @@ class Scene:
         for name, value in changes.items():
             if name not in known:
                 raise InputError(name, value, unknown_name(name, name, known).allowed)
-        if changes.get("scales") is not None:
+        if changes.get("scales") is not None or not self._thickness_given:  # a default is nothing that bending may follow from
             changes.setdefault("radius_to_thickness", None)
         if changes.keys() & {"mesh", "degree", "thickness", "modulus", "remanence", "obstacles", "sources"}:
             changes.setdefault("borders", ())

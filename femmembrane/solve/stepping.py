@@ -148,6 +148,4 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     if parameter == "number" and isinstance(potential, Family):
         rate = control_rate(potential, control, state.x, state.pressure, evaluation)
         return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)
-    # the gradient is linear in the factor: an exact derivative
-    other = evaluation.potential.evaluate(evaluation.x, state.pressure, value + 1.0)
-    return bordered.solve(evaluation.gradient - other.gradient, 0.0)
+    return bordered.solve(-evaluation.potential.factor_derivative(evaluation, state.pressure, value), 0.0)

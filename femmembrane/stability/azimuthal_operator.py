@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import whole
+from ..discretization.harmonics import AROUND, RADIAL, VERTICAL
 from ..discretization.space import Space
 from ..potential import Array, Potential
 from ..potential.contact import Reduction
+from .bending import Bending, bending_form, widened
 from .mode_resolution import small_eigenvalue
 from .rigid_motions import pencil_of, rigid_part
 from .second_variation import LocalResponse, response_at_quadrature, second_variation
 from .spectrum import Pencil
-from .wave_unknowns import AROUND, RADIAL, VERTICAL, WaveUnknowns, azimuthal_shape, wave_unknowns
+from .wave_unknowns import WaveUnknowns, azimuthal_shape, wave_unknowns
 
 if TYPE_CHECKING:
     from ..potential.contact import ContactEvaluation, ContactPotential
@@ -39,14 +41,14 @@ class AzimuthalOperator:
     band, mass : ndarray, shape (3 kd + 1, n_free)
         In LAPACK general band storage.
     half_bandwidth : int
-        kd = 3 degree + 2 (2 degree + 1 for n = 0).
+        kd = 3 degree + 2 (2 degree + 1 for n = 0), and about twice that with bending.
     numbering : ndarray of int, shape (n_nodes, 3)
         Unknown of (a, c, b) at each node along the meridian; n_free stands for what is held. On the axis at n = 1, c = -a share one.
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
     density : ndarray, shape (18 or 19, n_quadrature, n_elements)
-        What ``band`` integrates: second derivatives of the quadratic form at the points, times the weights, in the order of
+        What ``band`` integrates beside bending: second derivatives of the quadratic form at the points, times the weights, in the order of
         :func:`.second_variation.pairs_of`.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
@@ -54,6 +56,8 @@ class AzimuthalOperator:
         The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
     spring : ndarray, shape (n_free,), or None
         Of a total charge at n = 0, see :class:`.Evaluation`; waves do not change the capacitance to first order.
+    bending : Bending or None
+        What the bending of the sheet adds, where the scene has it.
     reduction : Reduction or None
         Where bodies hold nodes: ``band``, ``mass``, ``rigid`` and ``spin`` are without the normal displacements of these.
     """
@@ -69,6 +73,7 @@ class AzimuthalOperator:
     rigid: Array | None = None
     spin: Array | None = None
     spring: Array | None = None
+    bending: Bending | None = None
     reduction: Reduction | None = None
 
     def reduced(self, v: Array) -> Array:
@@ -128,15 +133,19 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     uniform = potential.sheet is None and potential.electrode is None
     if n == 1 and space.spins and uniform and turns:
         spin = _spin(space, layout, response, motions, pencil_of(band, mass, layout.half_bandwidth, None, 0.0, rigid))
+    kd, form = layout.half_bandwidth, bending_form(potential, x)
+    bending = None if form is None else form.at(int(n))
+    if bending is not None:
+        band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
     reduction = None
-    if potential.obstacles:
+    if potential.obstacles:  # a scene has bodies or bending
         band, reduction = _against_bodies(potential, x, pressure, layout, band)
     if reduction is not None:
-        lightest = np.full(reduction.out.shape, np.abs(mass[2 * layout.half_bandwidth]).min())
-        mass = reduction.band(mass, layout.half_bandwidth, lightest)
+        lightest = np.full(reduction.out.shape, np.abs(mass[2 * kd]).min())
+        mass = reduction.band(mass, kd, lightest)
         rigid, spin = (None if part is None else reduction.reduced(part) for part in (rigid, spin))
     return AzimuthalOperator(
-        band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin, spring, reduction
+        band, mass, kd, layout.numbers, int(n), response, space, density, rigid, spin, spring, bending=bending, reduction=reduction
     )
 
 

@@ -16,7 +16,7 @@ from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.path_memory import TraceMemory
 from ..results.special_point import SpecialPoint
-from ..scene import Scene
+from ..scene import ALL, Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
 from ..solve.active_set import contact_events
@@ -36,6 +36,8 @@ from .over_number import gas_of
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
 
+#: most numbers of waves that are tried one after the other for the first onset of all
+_MOST_WAVES = 20
 if TYPE_CHECKING:
     from ..potential.contact import ContactPotential
 
@@ -150,8 +152,8 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
 def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     if point.kind == "azimuthal_onset":
         message = (
-            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
-            "folds and equilibria are allowed"
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed here; fm.trace follows them "
+            "without a number or a quantity held; branch points, folds and equilibria are allowed"
         )
         raise InputError("start", "azimuthal_onset", message)
     return point.equilibrium
@@ -420,17 +422,42 @@ class TraceRun(Run[Branch]):
         before, after = self.found[-2:]
         top = (end.sigma - segment.a.sigma) / segment.length
         for n in self.scene.analysis.azimuthal_modes:
+            if n == ALL:
+                self.special += self._worst_onset(segment, top)
+                continue
             verdict = before.verdict(azimuthal=n)
             if verdict.smallest_eigenvalue * after.verdict(azimuthal=n).smallest_eigenvalue < 0:  # False where either is NaN (short-wave)
-
-                def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
-                    potential, own = self.potential_at(point), point.state.evaluation
-                    if potential.obstacles:
-                        potential = own.potential
-                    return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
-
                 with self.timed("special_points"):
-                    self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))
+                    self.special.append(self._onset(segment, int(n), 0.0, top, verdict.coefficients))
+
+    def _onset(self, segment: Segment[BranchPoint], n: int, low: float, top: float, guess: Array | None = None) -> SpecialPoint:
+        def eigenvalue(point: BranchPoint) -> float:
+            potential, own = self.potential_at(point), point.state.evaluation
+            if potential.obstacles:
+                potential = own.potential
+            return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
+
+        return self._special(segment.root("azimuthal_onset", eigenvalue, low, top), n)
+
+    def _worst_onset(self, segment: Segment[BranchPoint], top: float) -> list[SpecialPoint]:
+        """The point, if any, where the first of all numbers of waves loses stability, or the last regains it.
+
+        The number that is the worst at the unstable end has an onset. Where another number is unstable at that onset, its own lies nearer
+        to the stable end, and takes its place.
+        """
+        ends = [equilibrium.verdict(azimuthal=ALL) for equilibrium in self.found[-2:]]
+        if not ends[0].smallest_eigenvalue * ends[1].smallest_eigenvalue < 0:  # False where either is NaN
+            return []
+        n = next(verdict.azimuthal for verdict in ends if verdict.smallest_eigenvalue < 0)
+        with self.timed("special_points"):
+            point = self._onset(segment, n, 0.0, top)
+            for _ in range(_MOST_WAVES):
+                worst = point.equilibrium.verdict(azimuthal=ALL)
+                if worst.azimuthal == n or not worst.smallest_eigenvalue < 0 or worst.stable is None:
+                    break
+                n = worst.azimuthal
+                point = self._onset(segment, n, 0.0, top)
+        return [point]
 
     def _special(self, fold: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
         return special_point(self, self.scene_of(fold.point.state), fold, azimuthal)

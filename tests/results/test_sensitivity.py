@@ -450,7 +450,7 @@ def test_a_scale_of_a_scene_without_units_is_unknown() -> None:
 
 
 def test_wrinkles_that_come_and_go() -> None:
-    """In a tube that is wrinkled in part slopes change where the border of the wrinkles passes a quadrature point: a small step sees none."""
+    """In a tube that is wrinkled in part slopes change where the border passes a quadrature point: a small step sees none."""
     scene = fm.Scene(fm.Gent(30.0), fm.Cylinder(length=2.0, elements=16), tension_field=True)
     eq = solved(scene, {"volume": 5.5})
     parameter, h = Parameter(scene, "membrane.prestretch"), 1e-5

@@ -156,6 +156,10 @@ class Evaluation:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row
 
+    def released(self) -> Evaluation | None:
+        """The same state without the nodes that bodies hold by no force; None where there are none."""
+        return None
+
     def holds(self, unknown: int) -> bool:
         """Whether a body keeps an unknown from changing."""
         return False

@@ -67,7 +67,7 @@ def refusal(potential: Potential) -> str:
         return "the lid across an end that moves in its plane does not stay flat"
     if getattr(scene, "bending", False):
         return "the stiffness of bending is known to second order only"
-    if getattr(scene, "obstacles", ()):
+    if getattr(scene, "bodies", ()):
         return "the membrane may touch an obstacle"
     return ""
 

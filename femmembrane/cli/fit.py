@@ -71,7 +71,7 @@ def fit(
     with working(out, names), Interrupts() as interrupts:
         try:
             found = fitted(asked, tests, parameters, noise=deviations, units=units, starts=starts, intervals=intervals)
-            models = compare_models(asked, tests, noise=deviations, units=units) if compare else None
+            models = compare_models(asked, tests, noise=deviations, units=units, starts=starts or 3) if compare else None
         except SolveError as error:
             return fail(NOT_CONVERGED, explain(error.status, str(error)))
         interrupts.check()

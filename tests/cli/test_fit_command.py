@@ -47,7 +47,7 @@ def test_models_and_a_test_of_another_scene(tmp_path, silent):
         "stretch,uniaxial_stress_MPa\n" + "".join(f"{s},{mu * (s - s**-2) / 1e6}\n" for s in (1.2, 1.6, 2.2, 3.0)), encoding="utf-8"
     )
     other = f"{DEMOS / 'bulge-test.toml'}={strip}"
-    assert command(tmp_path / "out", other, "--noise", "1 %", "--compare", parameters=("scales.shear_modulus",)) == DONE
+    assert command(tmp_path / "out", other, "--noise", "1 %", "--compare", "--starts", "1", parameters=("scales.shear_modulus",)) == DONE
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "models.csv"}
     with (tmp_path / "out" / "models.csv").open(encoding="utf-8", newline="") as file:
         assert {row["model"] for row in csv.DictReader(file)} >= {"neo-hookean", "gent", "ogden-3"}

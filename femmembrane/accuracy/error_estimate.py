@@ -21,11 +21,15 @@ from ..solve.banded import negative_among
 from ..solve.controls import CONTROLS, control_kind
 from ..solve.finer_space import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
 from ..solve.newton import NewtonResult
-from ..solve.state import State
+from ..solve.state import State, displacement, distance
 from ..solve.state_resolution import unresolved
 from ..solve.wellposed import ill_posed
+from ..stability.profile import profile_at
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import axisymmetric_verdict
+
+#: the degree whose stresses, from slopes that are recovered, are about as good as those of one degree more
+_RECOVERED = 3
 
 
 def estimate_errors(potential: Potential, x: Array, pressure: float, control: str, verdicts: Mapping[str, Verdict]) -> ErrorEstimate:
@@ -60,7 +64,11 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     if found is None:
         return _without(control, values, method, reason)
     better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
-    return _compared(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better), method, reason)
+    errors = _errors(control, values, _numbers(finer, found.evaluation.x, found.pressure, found.evaluation, better))
+    if potential.scene.degree == _RECOVERED and finer.scene.degree == _RECOVERED + 1:
+        errors |= _stress_errors(values, finer, found, control)
+    errors["displacement"] = finer.space.unit * distance(finer, found.x, transferred(potential.space, x, finer.space))
+    return from_numbers(control, values, errors, method, reason)
 
 
 def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evaluation, verdicts: Mapping[str, Verdict]) -> dict[str, float]:
@@ -73,6 +81,8 @@ def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evalua
         "energy": evaluation.energy,
         "lambda_pressure": float(verdicts["pressure"].smallest_eigenvalue),
         "lambda_volume": float(verdicts["volume"].smallest_eigenvalue),
+        "displacement": potential.space.unit * displacement(potential, x),
+        **_end_stresses(potential, x, pressure),
     }
 
 
@@ -140,9 +150,26 @@ def _verdicts(
     return better, reason
 
 
-def _compared(control: str, values: Mapping[str, float], better: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
-    errors = {name: 0.0 if name == control else value - better[name] for name, value in values.items()}
-    return from_numbers(control, values, errors, method, reason)
+def _stress_errors(values: Mapping[str, float], finer: Potential, found: NewtonResult, control: str) -> dict[str, float]:
+    """Errors of the stresses at the ends, against elements of one degree more than the finer ones."""
+    kind = CONTROLS[control]
+    held = kind.at(kind.value(finer.space, found.x, found.pressure, found.evaluation.volume))
+    finest = potential_of(finer_scene(finer.scene))
+    best = solved_in(finest, held, finer, found.x, found.pressure)
+    if best.status is not Status.CONVERGED:
+        return dict.fromkeys(("stress_first", "stress_last"), np.nan)
+    stresses = _end_stresses(finest, best.x, best.pressure)
+    return {name: values[name] - stresses[name] for name in stresses}
+
+
+def _end_stresses(potential: Potential, x: Array, pressure: float) -> dict[str, float]:
+    """Meridional stresses at the first and the last end."""
+    first, last = profile_at(potential.scene, x, pressure, potential.space.ends[[0, -1]]).mechanical[0]
+    return {"stress_first": float(first), "stress_last": float(last)}
+
+
+def _errors(control: str, values: Mapping[str, float], better: Mapping[str, float]) -> dict[str, float]:
+    return {name: 0.0 if name == control else value - better[name] for name, value in values.items()}
 
 
 def _without(control: str, values: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:

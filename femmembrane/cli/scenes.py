@@ -43,6 +43,7 @@ degree = 2
 
 # [effects]
 # tension_field = true                 # wrinkles in place of compression
+# bending = true                       # verdicts with bending stiffness: how many wrinkles; needs membrane.radius_to_thickness
 
 [run]
 control = "volume"                     # or "pressure", "height"; "arc-length" takes start (a volume) and until
@@ -52,7 +53,7 @@ steps = 40
 
 [analysis]
 stability = ["pressure", "volume"]     # under which controls
-# azimuthal_modes = [1, 2]             # waves around the axis
+# azimuthal_modes = [1, 2]             # waves around the axis; "all" for the worst number
 # wrinkling = "total"                  # zones by the total or the "mechanical" stresses
 # error_estimates = true
 """

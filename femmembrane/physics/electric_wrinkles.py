@@ -45,6 +45,10 @@ class ElectricTensionField:
 
     def slack_strain(self) -> tuple[Any, Any]:
         """e_0, and whether there is one."""
+        with np.errstate(all="ignore"):  # where there is none Newton's method may go anywhere
+            return self._slack_strain()
+
+    def _slack_strain(self) -> tuple[Any, Any]:
         e: Any = self.taut.voltage * 0.0 + self.taut.charge * 0.0
         for _ in range(_SLACK_STEPS):
             stress, d11, d12 = self._along(e)
@@ -60,6 +64,10 @@ class ElectricTensionField:
 
     def width(self, e: Any) -> tuple[Any, Any]:
         """m(e), and whether there is one."""
+        with np.errstate(all="ignore"):
+            return self._width(e)
+
+    def _width(self, e: Any) -> tuple[Any, Any]:
         m = natural_width(self.taut.material)(e)[0]
         for _ in range(_STEPS):
             slope = self.taut.tangent(e, m)[2]
@@ -81,9 +89,12 @@ class ElectricTensionField:
         least1, least2 = least1 + free * (slack - least1), least2 + free * (slack - least2)
         lost1 = (1 - taut1) * (1 - exists1) + free * (1 - known)
         lost2 = (1 - taut2) * (1 - exists2) + free * (1 - known)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            none1, none2 = 0.0 / (1 - (lost1 > 0)), 0.0 / (1 - (lost2 > 0))
-        return taut1 * e1 + (1 - taut1) * least1 + none1, taut2 * e2 + (1 - taut2) * least2 + none2, taut1, taut2
+        with np.errstate(invalid="ignore"):
+            known1, known2 = (
+                np.sqrt(1.0 - 2 * (lost1 > 0)),
+                np.sqrt(1.0 - 2 * (lost2 > 0)),
+            )  # 1, or NaN for CasADi too, which takes 0/0 for 0
+        return known1 * (taut1 * e1 + (1 - taut1) * least1), known2 * (taut2 * e2 + (1 - taut2) * least2), taut1, taut2
 
     def beyond(self, e1: Any, e2: Any) -> tuple[Any, Any]:
         """Strains beyond natural width, (g_1, g_2): they have the signs that decide where the membrane is taut."""

@@ -69,7 +69,7 @@ class ElectrifiedHooke(Electrified):
                     g = self._pressing(J, thin)
                 off = thin - free + 2 * k * g
                 held = (power * k * g < thin) * (off * off <= (_CONVERGED * thin) ** 2)
-                thin = thin + 0.0 / held
+                thin = thin * np.sqrt(2.0 * held - 1)  # 1, or NaN
         return q1, q2, J, thin, g
 
     def _field_energy(self, J: Any, thin: Any) -> Any:

@@ -84,7 +84,7 @@ class Numbered(Potential):
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         self.magnetisation = Magnetisation.of(scene) if scene.sources else None
         data, local, parameters = self.symbols
-        self._own, self._given = ca.vertcat(*own), parameters
+        self._own, self._given = ca.vertcat(ca.SX(0, 1), *own), parameters
         self.symbols = data, local, ca.vertcat(parameters, *own)
 
     def at(self, values: Sequence[float]) -> NumberedMember:
@@ -157,6 +157,8 @@ class Numbered(Potential):
         """
         values = self.values if values is None else values
         count, space = len(self.numbers.names), self.space
+        if not count:
+            return NumberDerivatives(np.zeros((space.n_free, 0)), np.zeros(0), np.zeros(0))
         out = self._number_kernel(space.at_quadrature(x), self._parameters(x, pressure, values))
         out = out.reshape(count, -1, self.n_points)
         force = np.stack([space.assemble_vector(rows[:4].reshape(-1, space.n_elements)) for rows in out], axis=1)

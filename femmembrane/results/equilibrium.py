@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
-from ..scene import WRINKLING
+from ..scene import ALL, WRINKLING
 from ..scene.variation import Parameter
 from ..solve.controls import control_kind
 from ..solve.newton import relative_residual
 from ..threads import one_thread
 from . import door
+from .contact import Contact, contact_of
 
 if TYPE_CHECKING:
     from ..potential import Evaluation, Potential
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
-_OF_POTENTIAL = ("verdict", "errors", "tangent")
+_OF_POTENTIAL = ("verdict", "errors", "tangent", "contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +144,13 @@ class Equilibrium:
 
         return potential_of(self.scene)
 
+    @property
+    def contact(self) -> Contact | None:
+        """Contact with the bodies of the scene, see :class:`~femmembrane.results.contact.Contact`; None where it has none."""
+        if not self.scene.bodies:
+            return None
+        return self.remembered(("contact",), lambda: contact_of(self.potential.evaluate(self.state, self.pressure)))
+
     def number(self, name: str) -> float:
         """A number of its scene.
 
@@ -222,7 +230,11 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        return door.profile_at(self.scene, self.state, self.pressure, self.places(r)).columns(self.scene.converter)
+        s = self.places(r)
+        columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.converter)
+        if (contact := self.contact) is not None:
+            columns |= {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
+        return columns
 
     def places(self, r: ArrayLike | None = None) -> Array:
         """Parameters of the meridian at reference radii, see :meth:`profile`.
@@ -233,17 +245,22 @@ class Equilibrium:
             Default: the nodes.
         """
         space = self.potential.space
+        if r is None:
+            space = self.potential.root.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
+    def verdict(
+        self, control: str | None = None, *, azimuthal: int | str = 0, gas: Gas | None = None, electric: str | None = None
+    ) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
         Parameters
         ----------
         control : {"pressure", "volume", "gas"}
             What is held against axisymmetric perturbations. Left out for azimuthal perturbations, which do not change the volume.
-        azimuthal : int
-            Number of waves around the axis; 0 for axisymmetric perturbations.
+        azimuthal : int or "all"
+            Number of waves around the axis; 0 for axisymmetric perturbations. With "all" the number whose smallest eigenvalue is the
+            lowest is looked for among all that can matter (``femmembrane.stability.worst_waves``); it is the ``azimuthal`` of the verdict.
         gas : Gas, optional
             For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found, or the amount in the chamber of
             the scene that holds it.
@@ -256,11 +273,10 @@ class Equilibrium:
         InputError
             For an unknown control, or for arguments that do not go together.
         """
-        if not (control is None or isinstance(control, str)) or not isinstance(azimuthal, (int, np.integer)):
+        counted = isinstance(azimuthal, (int, np.integer)) or (isinstance(azimuthal, str) and azimuthal == ALL)
+        if not (control is None or isinstance(control, str)) or not counted:
             raise InputError(
-                "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
-                control or azimuthal,
-                "a name and a number are allowed",
+                "control" if counted else "azimuthal", control or azimuthal, 'a name and a number are allowed, or azimuthal="all"'
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
@@ -297,7 +313,7 @@ class Equilibrium:
         return door.gas(amount, chamber.volume, chamber.atmosphere) if amount > 0 and self.volume > -chamber.volume else None
 
     @one_thread
-    def _judged(self, potential: Potential, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+    def _judged(self, potential: Potential, control: str | None, azimuthal: int | str, gas: Gas | None) -> Verdict:
         evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
         return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
@@ -392,7 +408,8 @@ class Equilibrium:
             ``_pa``, ``_m``, ... as well, while the scales stay.
         to : str or list of str
             Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
-            Numbers that go with one, as other moduli of Ogden's material do, go with it here too.
+            Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
+            ``scales.thickness`` and ``scales.shear_modulus`` as well, in SI units: SI numbers stay, a held pressure included.
         held : {"pressure", "volume", "center_height", "gas"}, optional
             Default: the gas that it was found with, else what the scene's [run] prescribes, else the volume.
         r : array_like, optional
@@ -411,7 +428,12 @@ class Equilibrium:
         InputError
             For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
         SolveError
-            At a fold of what is held, where nothing has a derivative.
+            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+
+        Notes
+        -----
+        In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
+        border of the wrinkles passes a quadrature point.
 
         Examples
         --------

@@ -55,6 +55,10 @@ class ErrorEstimate:
         ``energy`` is elastic, magnetic and load energy together.
     lambda_pressure, lambda_volume : Deviation
         Smallest eigenvalues of the second variation under pressure and volume control.
+    displacement : Deviation
+        Root mean square over the reference area of the displacement, and of its error, over R0.
+    stress_first, stress_last : Deviation
+        Meridional Cauchy stress at the first end (the pole of a disc) and at the last (its rim), over mu.
     method : str
         What was compared.
     reason : str
@@ -70,6 +74,9 @@ class ErrorEstimate:
     energy: Deviation
     lambda_pressure: Deviation
     lambda_volume: Deviation
+    displacement: Deviation
+    stress_first: Deviation
+    stress_last: Deviation
     method: str
     reason: str = ""
 
@@ -126,6 +133,7 @@ ESTIMATED = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation"
 
 def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str, float], method: str, reason: str) -> ErrorEstimate:
     """The record of values and errors by name."""
+    values, errors = ({name: numbers.get(name, np.nan) for name in ESTIMATED} for numbers in (values, errors))  # older files have fewer
     scales = {name: abs(value) for name, value in values.items()}
     scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
     parts = {name: Deviation(values[name], errors[name], scales[name]) for name in ESTIMATED}

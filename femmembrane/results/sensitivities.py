@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError, SolveError, Status, unknown_name
 from ..quantities import PROFILE, quantity
 from ..scene.run import GAS, PRESCRIBED
+from ..scene.variation import Scale
 from ..solve.controls import CONTROLS, Control
 from ..solve.sensitivity import FOLDS, Rates, Sensitive, differentiated, sensitive
 from ..solve.state import inner
@@ -67,7 +68,17 @@ class _Derived:
         """Derivatives of a quantity with respect to all numbers."""
         plain, factor = self._plain(name)
         found = self._of(plain)
-        return found if factor == 1.0 else [value * factor for value in found]
+        if plain == name:
+            return found
+        kind, value = quantity(plain).si, self._value(plain)
+        powers = [p.power(kind) / p.value if isinstance(p, Scale) else 0.0 for p in self.known.parameters]
+        return [factor * (rate + power * value) for rate, power in zip(found, powers, strict=True)]
+
+    def _value(self, name: str) -> Answer:
+        """The quantity itself."""
+        if name not in _PROFILE:
+            return float(getattr(self.eq, name))
+        return self.eq.profile(self.along.r)[name]
 
     def _plain(self, name: str) -> tuple[str, float]:
         """The quantity without SI units, and what its derivative is multiplied by."""
@@ -102,7 +113,7 @@ class _Derived:
         if gas is None:
             raise InputError("of", "gas_amount", "no gas holds this equilibrium; a scene with chamber=fm.Chamber(volume=...) has one")
         total, absolute = self.eq.volume + gas.chamber, self.eq.pressure + gas.atmosphere
-        own = np.array([{"chamber.volume": absolute, "chamber.atmosphere": total}.get(name, 0.0) for name in self.known.names])
+        own = absolute * self.known.through("chamber.volume") + total * self.known.through("chamber.atmosphere")
         amount: Array = self.rates.pressure * total + absolute * self.rates.volume + own
         return amount
 
@@ -163,6 +174,8 @@ def _energy(moved: tuple[Scene, Array, float], name: str) -> float:
 def sensitivity_of(eq: Equilibrium, of: Any, to: Any, held: str | None, along: Along) -> Any:
     """See :meth:`.Equilibrium.sensitivity`."""
     quantities, known = _listed("of", of), _known(eq.scene, to)
+    if eq.status is Status.INTERPOLATED:
+        raise SolveError("an interpolated state is in no exact balance, and has no exact derivatives", status=Status.INTERPOLATED)
     potential, control = eq.potential, _control(eq, held)
     evaluation = potential.evaluate(eq.state, eq.pressure)
     rates = known.at_control(evaluation, eq.pressure, control)
@@ -233,6 +246,8 @@ def _listed(key: str, given: Any) -> tuple[str, ...]:
 
 def _known(scene: Scene, to: Any) -> Sensitive:
     """The derivatives of the equations of a scene with respect to numbers that it has."""
+    if scene.bodies:
+        raise InputError("to", to, "sensitivities are not computed beside an obstacle")
     try:
         return sensitive(scene, _listed("to", to))
     except InputError as error:

@@ -43,6 +43,26 @@ if TYPE_CHECKING:
 _TINY = 1e-300
 #: how a sheet is magnetised beside its susceptibility
 MAGNETISATION = ("demagnetization", "saturation", "remanence", "remanence_direction", "remanence_transport")
+#: scales that may change while all that was given in SI units stays
+SCALES = ("scales.thickness", "scales.shear_modulus")
+#: powers of both in the units of numbers by their last names, and of quantities by their kinds (:class:`~femmembrane.Scales`); strengths
+#: are squares of what is measured
+_POWERS: Mapping[str, tuple[float, float]] = {
+    "strength": (0.0, 1.0),
+    "weight": (0.0, 1.0),
+    "gamma": (1.0, 1.0),
+    "force": (1.0, 1.0),
+    "atmosphere": (1.0, 1.0),
+    "voltage": (1.0, 0.5),
+    "total_charge": (0.0, 0.5),
+    "frozen_charge": (0.0, 0.5),
+    "saturation": (0.0, 0.5),
+    "remanence": (0.0, 0.5),
+    "pressure": (1.0, 1.0),
+    "energy": (1.0, 1.0),
+    "gas": (1.0, 1.0),
+    "stress": (0.0, 1.0),
+}
 #: parts of a scene that are lists, by their names
 _LISTS = {"source": "sources", "load": "loads"}
 #: parts of a scene that are objects of their own
@@ -241,6 +261,77 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Scale:
+    """A scale of a scene in SI units, by which everything that was given in SI units becomes another number.
+
+    Lengths, ratios and the numbers of a material stay. What is held, as a pressure in Pa is, becomes another number too.
+
+    Parameters
+    ----------
+    scene : Scene
+        With scales.
+    name : {"scales.thickness", "scales.shear_modulus"}
+
+    Raises
+    ------
+    InputError
+        For another name, a scene without scales, and sources and loads of one's own, which nobody can convert.
+    """
+
+    scene: Scene
+    name: str
+
+    def __post_init__(self) -> None:
+        known = [*names(self.scene), *(SCALES if self.scene.scales is not None else ())]
+        if self.name not in known or self.name not in SCALES:
+            raise unknown_name("parameter", self.name, known)
+        numbers = set(names(self.scene))
+        for k, source in enumerate(self.scene.sources):
+            if f"source.{k}.strength" not in numbers:
+                raise InputError("parameter", self.name, f"sources with a strength are allowed, which is converted; not {source!r}")
+        for load in self.scene.loads:
+            if not all(name in _POWERS for name in _numbers(load)):
+                raise InputError("parameter", self.name, f"loads of the package are allowed, whose numbers are converted; not {load!r}")
+
+    @property
+    def value(self) -> float:
+        """The scale in SI units."""
+        return float(getattr(self.scene.scales, self.name.partition(".")[2]))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves an end of the membrane."""
+        return False
+
+    def power(self, name: str) -> float:
+        """Power of the scale in the unit of a number of the scene, or of a quantity by its kind."""
+        known = _POWERS.get(name) or (_POWERS.get(name.rpartition(".")[2]) if "." in name else None) or (0.0, 0.0)
+        return known[SCALES.index(self.name)]
+
+    def rates(self) -> dict[str, float]:
+        """How numbers of the scene change with the scale, by their names."""
+        found = ((name, self.power(name) * _named(self.scene, name).value) for name in names(self.scene))
+        return {name: -product / self.value for name, product in found if product}
+
+    def scene_at(self, value: float) -> Scene:
+        """The scene with this scale and the same SI numbers, checked like every scene.
+
+        Raises
+        ------
+        InputError
+            For a scale that is not positive.
+        """
+        old: Any = self.scene.scales
+        scales = dataclasses.replace(old, **{self.name.partition(".")[2]: value})
+        scene, electric = self.scene, self.scene.electric
+        for name in self.rates():
+            if not (name.startswith("electric.") and getattr(electric, "relative_permittivity", None) is not None):
+                parameter = _named(scene, name)
+                scene = parameter.scene_at(parameter.value * (self.value / value) ** self.power(name))
+        return scene.replace(scales=scales)
+
+
+@dataclass(frozen=True)
 class Numbers:
     """Several numbers of a scene, each of which may have any value while all others stay.
 
@@ -270,7 +361,7 @@ class Numbers:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The numbers one by one."""
-        return tuple(_unchecked(Parameter.__new__(Parameter), scene=self.scene, name=name) for name in self.names)
+        return tuple(_named(self.scene, name) for name in self.names)
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -316,6 +407,23 @@ def names(scene: Scene) -> list[str]:
     if isinstance(material, Ogden):
         return found + [f"material.{key}.{k}" for key in ("mu", "alpha") for k in range(len(material.mu))]
     return found + [f"material.{name}" for name in _numbers(material)]
+
+
+def parameter_of(scene: Scene, name: str) -> Parameter | Scale:
+    """A number of a scene, or one of its scales, by its name.
+
+    Raises
+    ------
+    InputError
+        For a name that the scene does not have.
+    """
+    return Scale(scene, name) if isinstance(name, str) and name in SCALES else Parameter(scene, name)
+
+
+def _named(scene: Scene, name: str) -> Parameter:
+    """A number whose name is known to be one."""
+    named: Parameter = _unchecked(Parameter.__new__(Parameter), scene=scene, name=name)
+    return named
 
 
 def _parts(scene: Scene) -> SimpleNamespace:

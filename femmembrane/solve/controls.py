@@ -243,6 +243,17 @@ class ArcLengthControl:
         return float(value), self.dual, self.dual_pressure
 
 
+@dataclass(slots=True, eq=False)
+class CarriedArcLength(ArcLengthControl):
+    """The same for displacements on another mesh: ``dual`` is of these, and ``offset`` what it is of the prediction."""
+
+    offset: float = 0.0
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        value = self.dual.dot(x) - self.offset + self.dual_pressure * (pressure - self.predicted_pressure)
+        return float(value), self.dual, self.dual_pressure
+
+
 class Controlled(Protocol):
     """A number that a control holds and a branch is followed in: one of :data:`CONTROLS`, or the amount of a :class:`Gas`.
 

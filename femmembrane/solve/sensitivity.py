@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -25,9 +24,9 @@ from ..errors import InputError, SolveError, Status
 from ..kernels.interface import Border
 from ..potential import Array, Evaluation, NumberDerivatives, Numbered
 from ..scene import Scene
-from ..scene.variation import Numbers, Parameter
+from ..scene.variation import Numbers, Scale, parameter_of
 from .banded import BandFactor
-from .controls import CONTROLS, Control, GasOver
+from .controls import CONTROLS, Control, Gas, GasOver
 from .state import inner
 
 #: movement for a change of what is held by its unit, in units of the membrane, from which on the state is at a fold of it
@@ -69,10 +68,10 @@ class Sensitive:
 
     def __init__(self, scene: Scene, names: Sequence[str]) -> None:
         self.scene, self.names = scene, tuple(names)
-        self.parameters = tuple(Parameter(scene, name) for name in self.names)
-        rates = [parameter.rates() for parameter in self.parameters]
+        self.parameters = tuple(parameter_of(scene, name) for name in self.names)
+        self._rates = rates = [parameter.rates() for parameter in self.parameters]
         own = list(dict.fromkeys(name for rate in rates for name in rate))
-        movers = [name for name in own if Parameter.moves.fget(_named(scene, name))]  # type: ignore[attr-defined]
+        movers = [parameter.name for parameter in Numbers(scene, tuple(own)).parameters if parameter.moves]
         # the places of two ends have no expression in common
         groups = [[name for name in own if name not in movers[1:]], *([name] for name in movers[1:])]
         self._groups = [(Numbered(Numbers(scene, tuple(group))), _mixed(rates, group)) for group in groups]
@@ -102,15 +101,21 @@ class Sensitive:
             state, by_pressure, numbers = found.state, found.pressure, numbers + found.numbers @ mix
         return state, by_pressure, numbers
 
-    def gas_rates(self, control: Control, pressure: float, volume: float) -> Array:
-        """Derivatives of the equation of a gas through the numbers of its chamber."""
+    def through(self, name: str) -> Array:
+        """How a number of the scene changes with each of the numbers asked for."""
+        return np.array([rate.get(name, 0.0) for rate in self._rates])
+
+    def held_rates(self, control: Control, pressure: float, volume: float) -> Array:
+        """Derivatives of the equation of a control through the chamber of a gas, and through the unit of a held value."""
         rates = np.zeros(len(self.names))
-        for k, name in enumerate(self.names):
-            part, _, key = name.partition(".")
-            if part == "chamber" and hasattr(control, "chamber"):
-                varies = {"volume": "chamber"}.get(key, key)
-                gas: Any = control
-                rates[k] = GasOver(gas.amount, gas.chamber, gas.atmosphere, varies).number_rate(pressure, volume)
+        if isinstance(control, Gas):
+            for name, varies in (("chamber.volume", "chamber"), ("chamber.atmosphere", "atmosphere")):
+                gas = GasOver(control.amount, control.chamber, control.atmosphere, varies)
+                rates += gas.number_rate(pressure, volume) * self.through(name)
+        kind, load = ("gas", control.amount) if isinstance(control, Gas) else (held_name(control), pressure)
+        for k, parameter in enumerate(self.parameters):
+            if isinstance(parameter, Scale):
+                rates[k] += parameter.power(kind) * load / parameter.value
         return rates
 
     def at_control(self, evaluation: Evaluation, pressure: float, control: Control) -> Rates:
@@ -124,7 +129,7 @@ class Sensitive:
         potential, x = evaluation.potential, evaluation.x
         _, row, corner = control.equation(potential.space, x, pressure, evaluation)
         own = self.equations(x, pressure)
-        held = held_rates(control, pressure, own.volume, own.height) + self.gas_rates(control, pressure, evaluation.volume)
+        held = held_rates(control, pressure, own.volume, own.height) + self.held_rates(control, pressure, evaluation.volume)
         border = evaluation.border(row, corner)
         refuse_fold(evaluation, border, control)
         return solved(border, evaluation, held, own)
@@ -145,10 +150,6 @@ class Sensitive:
         return solved(border, evaluation, numbers, own)
 
 
-def _named(scene: Scene, name: str) -> Parameter:
-    return Numbers(scene, (name,)).parameters[0]
-
-
 def _mixed(rates: Sequence[dict[str, float]], group: Sequence[str]) -> Array:
     """How numbers of a group change with each of the numbers asked for, shape (group, m)."""
     return np.array([[rate.get(name, 0.0) for rate in rates] for name in group]).reshape(len(group), len(rates))
@@ -167,7 +168,7 @@ def held_rates(control: Control, pressure: float, volume: Array, height: Array) 
 def refuse_fold(evaluation: Evaluation, border: Border, control: Control) -> None:
     """Refuse a state that has no derivative at the held quantity, as it is stationary there."""
     dx, dp = border.solve(np.zeros_like(evaluation.x), 1.0)
-    space, name = evaluation.potential.space, _name(control)
+    space, name = evaluation.potential.space, held_name(control)
     unit = space.units.get(name, 1.0)
     square = inner(evaluation.potential, dx, dp, dx, dp)
     if not square * unit**2 < _AT_FOLD**2:
@@ -176,7 +177,7 @@ def refuse_fold(evaluation: Evaluation, border: Border, control: Control) -> Non
         raise SolveError(message, status=Status.NOT_CONVERGED)
 
 
-def _name(control: Control) -> str:
+def held_name(control: Control) -> str:
     return next((name for name, kind in CONTROLS.items() if type(control) is kind.at), "amount of gas")
 
 

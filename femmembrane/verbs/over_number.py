@@ -22,6 +22,9 @@ from ..solve.state import State
 #: the quantities that can be held, by the words that users have for them
 HELD = {**{name: name for name in CONTROLS}, **PRESCRIBED, GAS: GAS}
 
+#: a number that no membrane notices, in place of 0 where all derivatives vanish: a large one may leave a tension field no state
+_SLIGHT = 1e-3
+
 
 @dataclass(frozen=True)
 class Hold:
@@ -89,6 +92,8 @@ def checked_number(key: str, scene: Scene, over: Any) -> Parameter:
     InputError
         For a name that the scene does not have.
     """
+    if scene.bodies:
+        raise InputError(key, over, "not done beside an obstacle; a run for each scene, with start=, is allowed")
     if over in HELD:
         allowed = ", ".join(names(scene)) or "(this scene has none)"
         raise InputError(key, over, f"no number of the scene; inflate, pressurize and trace follow it as it is. Numbers: {allowed}")
@@ -144,6 +149,6 @@ class OverNumber:
             return
         family, value = self.family, state.evaluation.factor
         if self.parameter.even:  # at 0 all derivatives vanish
-            value = value or 1.0
+            value = value or _SLIGHT
         if not np.any(family.number_derivative(state.x, state.pressure, value)):
             raise InputError("over", self.parameter.name, "it changes no force on this membrane, so that nothing would happen")

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from ..errors import Status
 from ..quantities import PLACES, Units, axis_label, key_label
 from ..results.curve import half_way, turning
+from ..results.postbuckling import SUBCRITICAL, UNKNOWN
 from ..results.special_point import SpecialPoint
+from ..scene import ALL
 from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
 from .labels import add_label
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
@@ -126,7 +128,7 @@ class Strands:
     """
 
     lines: list[tuple[Style, Array]]
-    bands: list[tuple[tuple[int, ...], Array]]
+    bands: list[tuple[tuple[int | str, ...], Array]]
     snaps: list[Array]
     steps: Array
     points: Array
@@ -325,15 +327,15 @@ def _draw_lines(
 def _draw_azimuthal(axes: Axes, branch: Branch, shown: _Shown) -> None:
     """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them, and for shorter waves."""
     lines = list(_azimuthal(branch, shown))
-    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), lost))
+    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), [n if isinstance(n, int) else 0 for n in lost]))
     for lost, line in lines:
         if lost:
-            named = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
+            named = new_label(axes, "unstable to azimuthal n = " + ", ".join("any" if n == ALL else str(n) for n in lost))
             grey = str(max(0.84 - 0.14 * order.index(lost), 0.4))
             axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=named)
 
 
-def _azimuthal(branch: Branch, shown: _Shown) -> Iterator[tuple[tuple[int, ...], Array]]:
+def _azimuthal(branch: Branch, shown: _Shown) -> Iterator[tuple[tuple[int | str, ...], Array]]:
     """The stretches of the line by the azimuthal modes to which they are unstable."""
     if not branch.scene.analysis.azimuthal_modes:
         return iter(())
@@ -359,12 +361,21 @@ def _draw_jumps(axes: Axes, shown: _Shown) -> None:
             axes.plot([], [], color=RED, linewidth=1.6, label=new_label(axes, "snap"))
 
 
+def after(point: SpecialPoint) -> str:
+    """Of an azimuthal onset: subcritical or supercritical at a held volume; empty where that is not known, and of other points."""
+    kind = point.postbuckling.kind if point.azimuthal else UNKNOWN
+    return "" if kind == UNKNOWN else kind
+
+
 def _draw_special_points(axes: Axes, branch: Branch, shown: _Shown) -> None:
     points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit)]
-    for kind in dict.fromkeys(str(p.kind) for p in points):
+    looks = [(str(p.kind), after(p)) for p in points]
+    for kind, word in dict.fromkeys(looks):
         marker, named = MARKERS.get(kind, ("X", kind.replace("_", " ")))
-        places = shown.at([p for p in points if str(p.kind) == kind])
-        look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
+        named = f"{named}, {word}" if word else named
+        places = shown.at([p for p, look in zip(points, looks, strict=True) if look == (kind, word)])
+        face = "black" if word == SUBCRITICAL else "white"
+        look: dict[str, Any] = {"markersize": 7, "markerfacecolor": face, "markeredgecolor": "black", "markeredgewidth": 1.2}
         axes.plot(*places.T, marker, label=new_label(axes, named), zorder=4, **look)
     for point, place in zip(points, shown.at(points), strict=True):
         if point.azimuthal:

@@ -27,6 +27,7 @@ from ..results.analyses.verdicts import Verdicts
 from ..results.curve import specials_between
 from ..results.table import columns
 from ..results.zones import KINDS
+from ..scene import ALL
 from .backend import load
 from .branch_lines import MARKERS, Strands, answer
 from .figures import AMONG, Style
@@ -155,10 +156,11 @@ def _look(style: Style) -> dict[str, Any]:
     return {"label": style.label, "color": color, "dark": dark(color), "dash": dashes, "width": 1.4 * style.width}
 
 
-def _bands(bands: Sequence[tuple[tuple[int, ...], Array]]) -> list[dict[str, Any]]:
+def _bands(bands: Sequence[tuple[tuple[int | str, ...], Array]]) -> list[dict[str, Any]]:
     """Darker for more modes, and for shorter waves, as in other pictures."""
-    order = sorted({waves for waves, _ in bands}, key=lambda waves: (len(waves), waves))
-    look = {waves: {"label": "unstable to azimuthal n = " + ", ".join(map(str, waves)), **_grey(k)} for k, waves in enumerate(order)}
+    order = sorted({waves for waves, _ in bands}, key=lambda waves: (len(waves), list(map(str, waves))))
+    names = [", ".join("any" if n == ALL else str(n) for n in waves) for waves in order]
+    look = {waves: {"label": f"unstable to azimuthal n = {names[k]}", **_grey(k)} for k, waves in enumerate(order)}
     return [{**look[waves], "values": _columns(line)} for waves, line in bands]
 
 
@@ -237,7 +239,7 @@ def _modes(equilibrium: Equilibrium) -> Iterator[tuple[str, int, Mapping[str, Ar
     for p in wanted:
         verdict = equilibrium.verdict(p.control, azimuthal=p.azimuthal)
         if verdict.mode is not None:
-            yield f"{p.words}: λ = {verdict.smallest_eigenvalue:.4g}", p.azimuthal, verdict.mode
+            yield f"{p.words}: λ = {verdict.smallest_eigenvalue:.4g}", verdict.azimuthal, verdict.mode
     if not wanted:
         for n in _WAVES:
             try:
@@ -265,7 +267,7 @@ def _room(shown: Sequence[Equilibrium], units: Units) -> dict[str, Any]:
     box = Box.of([equilibrium.profile() for equilibrium in shown])
     around, length = surroundings(shown[0].scene, box), units.factor("rho")
     bodies = [
-        {"label": body.label, "moment": body.moment, "rho": [_rounded(length * r, 6) for r, _ in body.points]}
+        {"label": body.label, "moment": body.moment, "rigid": body.rigid, "rho": [_rounded(length * r, 6) for r, _ in body.points]}
         | {"z": [_rounded(length * z, 6) for _, z in body.points]}
         for body in around.near
     ]

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quantities import Units, axis_label, caption
-from .branch_lines import MARKERS, answer, draw_branch
+from .branch_lines import MARKERS, after, answer, draw_branch
 from .figures import (
     AMONG,
     BOTH,
@@ -54,6 +54,7 @@ __all__ = [
     "VOLUME_ONLY",
     "Style",
     "add_label",
+    "after",
     "answer",
     "draw_branch",
     "draw_legend",

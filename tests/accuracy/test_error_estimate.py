@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.results.error_estimate import ESTIMATED
+from femmembrane.results.error_estimate import ESTIMATED, from_numbers
 from femmembrane.stability import verdict
 from tests.cases import LIMIT_POINTS, OGDEN, POINTS, disc_scene
 
@@ -20,6 +20,10 @@ EIGENVALUES = ("lambda_pressure", "lambda_volume")
 AT_VOLUME = [p for p in POINTS if p.is_minimum("volume")]
 AT_PRESSURE = [p for p in POINTS if p.is_minimum("pressure")]
 BY_NAME = {p.name: p for p in (*POINTS, *LIMIT_POINTS)}
+
+
+#: what no table has: it is compared with finer meshes below
+LOCAL = ("displacement", "stress_first", "stress_last")
 
 
 @cache
@@ -46,7 +50,7 @@ def effectivities(name: str, control: str, degree: int, elements: int, floor: fl
     found: dict[str, float] = {}
     parts = sum(abs(getattr(estimate, q).value - expected(name, q)) for q in ENERGIES[:2])
     for quantity in ESTIMATED:
-        if quantity in (control, "center_height") or (quantity == "magnetic_energy" and not BY_NAME[name].scene.sources):
+        if quantity in (control, "center_height", *LOCAL) or (quantity == "magnetic_energy" and not BY_NAME[name].scene.sources):
             continue
         part = getattr(estimate, quantity)
         true = part.value - expected(name, quantity)
@@ -346,3 +350,36 @@ def test_a_branch_without_equilibria_keeps_its_columns():
     branch = fm.run(asked("volume", error_estimates=True))[:0]
     assert "error_pressure" in branch.to_dataframe().columns
     assert branch.to_xarray()["error_estimate"].shape == (0, len(ESTIMATED))
+
+
+@pytest.mark.parametrize(
+    ("scene", "volume"),
+    [
+        (disc_scene(OGDEN, (200, 6.5), elements=12, degree=2), 20.0),
+        (fm.Scene(material=fm.NeoHookean(), mesh=fm.cap(0.5, 10), degree=2), 1.5),
+        (fm.Scene(material=OGDEN, mesh=fm.annulus(0.3, 10), degree=3), 1.0),
+        (fm.Scene(material=OGDEN, mesh=fm.cylinder(3.0, 12, top="hub"), degree=2), 12.0),
+        (fm.Scene(material=OGDEN, mesh=fm.disc(10), degree=2, thickness="1 - 0.4*R**2"), 2.0),
+    ],
+)
+def test_profiles_and_stresses_at_the_ends(scene, volume):
+    """Against elements of a sixteenth of the error: the norm of the error of the shape, and the stresses at pole and rim."""
+    eq = fm.equilibrium(scene, volume=volume, solver="newton")
+    estimate = eq.error_estimate()
+    best = fm.equilibrium(scene.replace(mesh=scene.mesh.refined().refined(), degree=scene.degree + 2), volume=volume, solver="newton")
+    s = np.linspace(*eq.potential.space.ends[[0, -1]], 400)[1:-1]
+    mine, theirs = eq.profile(s), best.profile(s)
+    off = np.hypot(mine["rho"] - theirs["rho"], mine["eta"] - theirs["eta"])
+    rms = np.sqrt((off**2 * mine["r"]).sum() / mine["r"].sum())
+    assert estimate.displacement.error == pytest.approx(rms, rel=0.3)
+    for k, name in ((0, "stress_first"), (-1, "stress_last")):
+        true = eq.profile()["mechanical_stress_1"][k] - best.profile()["mechanical_stress_1"][k]
+        assert 0.5 * abs(true) < abs(getattr(estimate, name).error) < 2 * abs(true)
+
+
+def test_an_older_file_has_fewer_estimates():
+    """What it lacks is not known, and nothing else is lost."""
+    values = {name: 1.0 for name in ESTIMATED if name not in LOCAL}
+    estimate = from_numbers("volume", values, dict.fromkeys(values, 1e-3), "compared", "")
+    assert estimate.pressure.relative == 1e-3
+    assert np.isnan([estimate.displacement.value, estimate.stress_last.error]).all()

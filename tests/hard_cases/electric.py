@@ -14,6 +14,7 @@ DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), degree=4)
 SPHERE = fm.Scene(material=fm.NeoHookean(), mesh=fm.sphere(8), degree=4)
 #: pull-in of a neo-Hookean sphere at P = 0: l = 4^(1/6)
 PULL_IN = np.sqrt(0.75 * 4 ** (-1 / 3))
+NEAR_LIMIT = "two states merge there"
 NEAR = "the limit point lies at P -> 0, where all stress vanishes"
 
 
@@ -23,6 +24,12 @@ def under(scene: fm.Scene, **electric: float) -> fm.Scene:
 
 def ball(stretch: float) -> float:
     return 4 * np.pi / 3 * stretch**3
+
+
+def largest_square(pressure: float) -> float:
+    """Largest phi^2 of a sphere at a pressure: that of phi^2 = (2/l - 2/l^7 - P)/(2 l)."""
+    stretch = np.linspace(1.0, 2.0, 200001)
+    return float(((2 / stretch - 2 / stretch**7 - pressure) / (2 * stretch)).max())
 
 
 @FAMILY.case("disc, voltage 1e-12", "phi^2 = 1e-24 beside strains of order one", Number(1.06687357, rel=1e-6))
@@ -40,6 +47,24 @@ def tiny_charge() -> tuple[float, float]:
 @FAMILY.case("sphere just above pull-in", NEAR, Stop(fm.Status.NOT_CONVERGED, "no equilibrium was found"), 1.05)
 def at_pull_in(share: float) -> float:
     return settled(fm.equilibrium(under(SPHERE, voltage=share * PULL_IN), pressure=0.02)).pressure
+
+
+@FAMILY.case("a ten-thousandth below the largest voltage", NEAR_LIMIT, Number(1.0, rel=1e-6), 1 - 1e-4)
+@FAMILY.case("a ten-thousandth above the largest voltage", NEAR_LIMIT, Stop(fm.Status.NOT_CONVERGED, "no equilibrium was found"), 1 + 1e-4)
+def next_to_the_limit(share: float) -> float:
+    phi = share * np.sqrt(largest_square(0.5))
+    eq = settled(fm.equilibrium(under(SPHERE, voltage=phi), pressure=0.5))
+    stretch = np.cbrt(eq.volume * 3 / (4 * np.pi))
+    return (2 / stretch - 2 / stretch**7 - 0.5) / (2 * stretch) / phi**2
+
+
+@FAMILY.case(
+    "tension field, no slack state any more",
+    "beyond phi^2 = 0.4725 a slack film has no width",
+    Stop(fm.Status.NO_EQUILIBRIUM, "voltage could not be turned on"),
+)
+def slack_beyond_pull_in() -> fm.Equilibrium:
+    return fm.equilibrium(under(DISC.replace(tension_field=True), voltage=0.75), volume=0.1)
 
 
 @FAMILY.case("sphere, charge through the limit of the voltage", "the voltage turns, the charge does not", Number((1.0, 1.0, 1.0), rel=1e-6))

@@ -8,6 +8,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.physics.response import response_of
 from femmembrane.physics.tension_field import natural_strains
+from femmembrane.potential import potential_of
 from tests.cases import OGDEN
 
 DISC = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), degree=4, tension_field=True)
@@ -83,6 +84,23 @@ def test_wrinkles_are_a_local_minimum():
     assert mechanical == pytest.approx(response.field_squared(e1, e2)[wrinkled], rel=1e-10)
 
 
+@pytest.mark.parametrize("material", [fm.NeoHookean(), fm.Ogden.treloar(), fm.Hooke(0.3)], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("tension_field", [False, True])
+def test_the_potential_has_the_same_response(material, tension_field):
+    """What elements compute is what formulas say, where there is no state, and so no number, as well."""
+    scene = DISC.replace(material=material, electric=fm.Electric(voltage=1.0), tension_field=tension_field)
+    scale = 0.3 if isinstance(material, fm.Hooke) else 1.0
+    e1, e2 = scale * STRAINS
+    lost = 0
+    for square in (0.02, 0.4, 0.8, 3.0):
+        response = response_of(scene, np.full_like(e1, square))
+        expected = np.stack([*response.stress(e1, e2), *response.tangent(e1, e2)])
+        found = potential_of(scene).response(e1, e2, np.full_like(e1, square))
+        np.testing.assert_allclose(found[:2], expected[:2], rtol=1e-9, atol=1e-12)
+        lost += int(np.isnan(found[0]).sum())
+    assert bool(lost) == (tension_field or isinstance(material, fm.Hooke))
+
+
 def test_branch():
     """Along a relaxed branch dE/dV = P, and at one volume dE/dphi = -Q with the capacitance of the wrinkled width."""
     scene = DISC.replace(electric=fm.Electric(voltage=0.3))
@@ -96,3 +114,26 @@ def test_branch():
     held = fm.equilibrium(scene.replace(electric=fm.Electric(total_charge=eq.charge)), volume=at)
     assert (held.pressure, held.voltage) == pytest.approx((eq.pressure, 0.3), rel=1e-7)
     assert all(eq.verdict(azimuthal=n).stable for n in (1, 2))
+
+
+def test_cold_start_under_a_high_voltage():
+    """Much of the film is wrinkled there; the same state as along the branch over the voltage."""
+    scene = DISC.replace(mesh=fm.disc(12), electric=fm.Electric(voltage=0.0))
+    phi = np.sqrt(0.38)
+    branch = fm.trace(scene, over="electric.voltage", hold={"volume": 0.9}, until={"electric.voltage": phi}, max_steps=100)
+    cold = fm.equilibrium(scene.replace(electric=fm.Electric(voltage=phi)), volume=0.9)
+    assert cold.pressure == pytest.approx(branch[-1].pressure, rel=1e-8)
+    assert cold.verdict("pressure").stable
+
+
+@pytest.mark.parametrize("electric", [{"voltage": 0.5}, {"total_charge": 1.5}], ids=str)
+@pytest.mark.parametrize("tension_field", [False, True])
+def test_rate_of_the_forces_while_a_voltage_is_turned_on(electric, tension_field):
+    """By central differences; it is no difference of the whole where forces are not linear in the squared voltage."""
+    scene = DISC.replace(electric=fm.Electric(**electric), tension_field=tension_field)
+    potential, h = potential_of(scene), 1e-4
+    r = potential.space.interpolation_points()
+    x = potential.space.interpolate(-0.35 * r * (1 - r**2), 0.3 * (1 - r**4))
+    a, at, b = (potential.evaluate(x, 0.3, 0.6 + k * h) for k in (-1, 0, 1))
+    found = potential.factor_derivative(at, 0.3, 0.6)
+    np.testing.assert_allclose(found, (b.gradient - a.gradient) / (2 * h), rtol=0, atol=1e-4 * np.abs(found).max())

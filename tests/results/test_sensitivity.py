@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 import femmembrane as fm
 from femmembrane.results.verdict import Verdict
-from femmembrane.scene.variation import Parameter, names
+from femmembrane.scene.variation import Parameter, Scale, names
 from femmembrane.solve.responses import Responses
 from femmembrane.stability.eigenvalue_rates import require_simple
 from femmembrane.stability.spectrum import Pencil
@@ -372,6 +372,8 @@ def test_a_fold_has_no_derivative_at_what_is_stationary_there() -> None:
         fm.trace(branch.scene, until={"volume": 1.0}).sensitivity("limit_pressure", "material.ratio")
     with pytest.raises(fm.InputError, match="ask for them in two calls"):
         branch.sensitivity(["limit_pressure", "volume"], "material.ratio")
+    with pytest.raises(fm.SolveError, match="interpolated"):
+        branch.at(volume=1.0).sensitivity("pressure", "material.ratio")
 
 
 def test_a_multiple_eigenvalue_has_no_derivative() -> None:
@@ -387,3 +389,70 @@ def test_a_multiple_eigenvalue_has_no_derivative() -> None:
         else:
             with pytest.raises(fm.InputError, match="multiple"):
                 require_simple(pencil, verdict)
+
+
+_SCALES = fm.Scales(radius=0.02, thickness=3e-4, shear_modulus=4e5)
+SCALED: Mapping[str, tuple[fm.Scene, Mapping[str, float]]] = {
+    "bare": (fm.Scene(fm.NeoHookean(), fm.Cap(height=0.4, elements=16), scales=_SCALES), {"center_height": 0.9}),
+    "pressure": (fm.Scene(fm.MooneyRivlin(0.1), DISC, scales=_SCALES), {"pressure": 0.7}),
+    "loads": (
+        fm.Scene(
+            fm.MooneyRivlin(0.1),
+            DISC,
+            sources=[fm.Dipole(0.05, 1.5)],
+            susceptibility=0.5,
+            loads=[fm.Weight(0.3), fm.Hydrostatic(0.2)],
+            scales=_SCALES,
+        ),
+        {"pressure": 0.4},
+    ),
+    "volts": (
+        fm.Scene(fm.MooneyRivlin(0.1), DISC, electric=fm.Electric(voltage=9000.0, relative_permittivity=3.0), scales=_SCALES),
+        {"volume": 1.0},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SCALED)
+def test_a_sheet_that_is_thicker_or_stiffer(case: str) -> None:
+    """All that was given in SI units stays, what is held included; answers in SI units and without."""
+    scene, held = SCALED[case]
+    eq = solved(scene, held)
+    ((name, load),) = held.items()
+    of = ["pressure", "pressure_pa", "volume", "elastic_energy_j", "center_height_m", "total_stress_1_pa", "rho"]
+    to = ["scales.thickness", "scales.shear_modulus"]
+    found = eq.sensitivity(of, to, held=name, r=[0.1])
+
+    def answer(value: float, scale: str) -> Any:
+        changed = Scale(scene, scale).scene_at(value)
+        scales = changed.scales
+        assert scales is not None
+        size = _SCALES.to_si("pressure", 1.0) / scales.to_si("pressure", 1.0) if name == "pressure" else 1.0
+        other = solved(changed, {name: load * size}, eq)
+        profile = other.profile([0.1])
+        si = scales.to_si
+        state = [other.pressure, si("pressure", other.pressure), other.volume, si("energy", other.elastic_energy)]
+        return np.array([*state, si("length", other.center_height), profile["total_stress_1_pa"][0], profile["rho"][0]])
+
+    for scale in to:
+        value = getattr(_SCALES, scale.partition(".")[2])
+        slopes = [(answer(value * (1 + t), scale) - answer(value * (1 - t), scale)) / (2 * t * value) for t in (2e-3, 1e-3)]
+        expected = (4 * slopes[1] - slopes[0]) / 3
+        mine = np.array([np.ravel(found[q][scale])[0] for q in of])
+        allowed = 1e-6 * np.abs(expected) + 1e-8 * np.abs(answer(value, scale)) / value
+        assert (np.abs(mine - expected) <= allowed).all(), (scale, mine, expected)
+
+
+def test_a_scale_of_a_scene_without_units_is_unknown() -> None:
+    with pytest.raises(fm.InputError, match="unknown") as error:
+        solved(fm.Scene(fm.MooneyRivlin(0.1), DISC), {"volume": 1.0}).sensitivity("pressure", "scales.thickness")
+    assert error.value.key == "to"
+
+
+def test_wrinkles_that_come_and_go() -> None:
+    """In a tube that is wrinkled in part slopes change where the border passes a quadrature point: a small step sees none."""
+    scene = fm.Scene(fm.Gent(30.0), fm.Cylinder(length=2.0, elements=16), tension_field=True)
+    eq = solved(scene, {"volume": 5.5})
+    parameter, h = Parameter(scene, "membrane.prestretch"), 1e-5
+    after, before = (solved(parameter.scene_at(1.0 + t), {"volume": 5.5}, eq).pressure for t in (h, -h))
+    assert eq.sensitivity("pressure", "membrane.prestretch", held="volume") == pytest.approx((after - before) / (2 * h), rel=1e-7)

@@ -599,6 +599,11 @@ class Potential:
         return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
     @property
+    def field_operations(self) -> int:
+        """Number of elementary operations of :meth:`field_energy` at one point."""
+        return int(self._field_energy_function.n_instructions())
+
+    @property
     def tilts(self) -> bool:
         """Whether the magnetic energy depends on the slope of the meridian."""
         return self.magnetisation is not None and self.magnetisation.tilts

@@ -152,8 +152,8 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
 def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     if point.kind == "azimuthal_onset":
         message = (
-            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
-            "folds and equilibria are allowed"
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed here; fm.trace follows them "
+            "without a number or a quantity held; branch points, folds and equilibria are allowed"
         )
         raise InputError("start", "azimuthal_onset", message)
     return point.equilibrium

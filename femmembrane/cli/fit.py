@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -86,11 +85,8 @@ def fit(
                 models.write_csv(out / "models.csv")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
-    if sys.stdout.isatty():
-        say(
-            "\n".join([str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)])
-            + "\n"
-        )
+    told = [str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)]
+    say("\n".join(told) + "\n")
     if found.status is not Status.CONVERGED:
         return fail(NOT_CONVERGED, f"{'; '.join(found.notes)}. What suits the data best so far is in {out}")
     return DONE

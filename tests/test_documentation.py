@@ -113,6 +113,11 @@ def test_every_scene_file_is_shown(built: Path) -> None:
     assert [path.name for path in (ROOT / "demos").glob("*.toml") if f'id="scene-{path.stem}"' not in text] == []
 
 
+def test_every_notebook_is_shown(built: Path) -> None:
+    text = (built / "generated" / "notebooks.html").read_text(encoding="utf-8")
+    assert [path.name for path in (ROOT / "demos" / "notebooks").glob("*.ipynb") if f">{path.name}<" not in text] == []
+
+
 def test_every_page_of_the_repository_is_shown() -> None:
     """Whoever writes a page in Markdown gives it a place in the documentation."""
     shown = [

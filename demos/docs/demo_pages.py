@@ -58,6 +58,9 @@ def stage(here: Path, names: Collection[str] | None) -> None:
         copies.mkdir(parents=True)
         heading, words = HEADERS[folder]
         (copies / "GALLERY_HEADER.rst").write_text(f"{heading}\n{'=' * len(heading)}\n\n{words}\n", encoding="utf-8")
+        for beside in FOLDERS[folder].iterdir():  # what a script reads
+            if beside.suffix in (".toml", ".csv"):
+                shutil.copyfile(beside, copies / beside.name)
         for script in scripts(folder):
             run = names is None or script.name in names
             pages = here / "generated" / folder

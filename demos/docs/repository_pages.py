@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import tomllib
@@ -14,6 +15,7 @@ from demo_pages import DEMOS, ROOT
 from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
+NOTEBOOKS = DEMOS / "notebooks"
 #: a page that stands elsewhere in the repository, in the words of MyST; options are read here
 INCLUDE = re.compile(r"```\{include\} (\S+)\n((?::.*\n)*)```\n?")
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
@@ -30,6 +32,7 @@ def generate(here: Path, run: Collection[str] | None) -> None:
     demo_pages.stage(here, run)
     drawings.draw(here / "generated" / "drawings")
     write(here / "generated" / "scenes.rst", scenes(here))
+    write(here / "generated" / "notebooks.rst", notebooks(here))
     for name, text in reference():
         write(here / "generated" / "reference" / f"{name}.rst", text)
 
@@ -48,16 +51,32 @@ def scenes(here: Path) -> str:
     return "\n".join(parts)
 
 
+def notebooks(here: Path) -> str:
+    """Words and code of the notebooks, each with the file to open."""
+    parts = ["Notebooks", "=========", "", "To be opened in Jupyter, where they show branches to click through.", ""]
+    for path in sorted(NOTEBOOKS.glob("*.ipynb")):
+        file = relative(path, here / "generated")
+        parts += [path.name, "-" * len(path.name), "", f":download:`{path.name} <{file}>`", ""]
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+            text = "".join(cell["source"])
+            if cell["cell_type"] == "code":
+                parts += [".. code-block:: python", "", *(f"    {line}" for line in text.splitlines()), ""]
+            else:
+                parts += [demo_pages.restructured(re.sub(r"^#+ ", "", text, flags=re.MULTILINE)), ""]
+    return "\n".join(parts)
+
+
 # --- public names
 
 #: page, title, and the modules whose names it has; what no line claims stands on the last page
 GROUPS = (
-    ("verbs", "Verbs", r"verbs\b|results\.store"),
+    ("verbs", "Verbs", r"verbs(?!\.fit)\b|results\.store"),
     ("scene", "Scenes, runs and controls", r"scene\b|solve\b|physics\.(chamber|electric|scales)"),
     ("shapes", "Shapes and mesh files", r"discretization\b"),
     ("materials", "Materials", r"physics\.(hooke|invariants?|materials|named|elastic\w*)\b|potential\b"),
     ("sources", "Magnetic sources", r"physics\.(magnetics|magnets|mixture|sources|tabulated)\b"),
-    ("loads", "Loads", r"physics\.loads\b"),
+    ("loads", "Loads and obstacles", r"physics\.(loads|obstacles)\b"),
+    ("fits", "Fits to measurements", r"calibration\b|(verbs|results)\.fit\b"),
     ("results", "Results", r"results\b"),
     ("stability", "Tests of stability", r"stability\b"),
     ("views", "Pictures and files", r"views\b"),
@@ -160,7 +179,7 @@ def linked(text: str, page: Path, folder: Path, pages: dict[Path, Path]) -> str:
             return match[0]
         path, _, anchor = target.partition("#")
         found = (page.parent / path).resolve()
-        place = relative(pages.get(found, demo_page(found) or found), folder)
+        place = relative(pages.get(found) or demo_page(found) or found, folder)
         return f"{picture}[{words}]({place}{'#' + anchor if anchor else ''})"
 
     text = LINK.sub(link, text)
@@ -182,6 +201,8 @@ def named(words: Callable[[str], str], page: Path, folder: Path) -> Callable[[re
 
 
 def demo_page(path: Path) -> Path | None:
-    """The page that sphinx-gallery makes of a script."""
+    """The page of a script, or of the folder of notebooks."""
+    if path == NOTEBOOKS:
+        return HERE / "generated" / "notebooks.rst"
     folder = next((name for name, top in demo_pages.FOLDERS.items() if path.parent == top and path.suffix == ".py"), None)
     return HERE / "generated" / folder / f"{path.stem}.rst" if folder else None

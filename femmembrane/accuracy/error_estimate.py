@@ -79,6 +79,8 @@ def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evalua
         "center_height": potential.space.center_height(x),
         "elastic_energy": evaluation.elastic_energy,
         "magnetic_energy": evaluation.magnetic_energy,
+        "load_energy": evaluation.load_energy,
+        "electric_energy": evaluation.electric_energy,
         "energy": evaluation.energy,
         "lambda_pressure": float(verdicts["pressure"].smallest_eigenvalue),
         "lambda_volume": float(verdicts["volume"].smallest_eigenvalue),

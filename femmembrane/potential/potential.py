@@ -219,6 +219,11 @@ class Evaluation:
     def energy(self) -> float:
         return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
 
+    @property
+    def energy_size(self) -> float:
+        """Sum of the sizes of all energies: what an error of their sum is compared with."""
+        return abs(self.elastic_energy) + abs(self.magnetic_energy) + abs(self.load_energy) + abs(self.electric_energy)
+
 
 class Potential:
     """Discrete potential of a scene.

@@ -14,7 +14,7 @@ from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
 from ..scene import ALL, WRINKLING
 from ..scene.variation import Parameter
-from ..solve.controls import control_kind
+from ..solve.controls import check_height, control_kind
 from ..solve.newton import relative_residual
 from ..threads import one_thread
 from . import door
@@ -130,12 +130,7 @@ class Equilibrium:
 
     @property
     def _electric(self) -> dict[str, float]:
-        own = self.scene.electric
-        if own is not None and self.scene.electricity is None:  # no voltage or charge on electrodes that have a capacitance
-            plain = replace(own.plain(self.scene.scales), **{own.load: 1.0})
-            found = self.in_scene(self.scene.replace(electric=plain, scales=None))._electric
-            return {**dict.fromkeys(found, 0.0), "capacitance": found["capacitance"]}
-        return self.remembered(("electric",), lambda: self.potential.electric_quantities(self.state))
+        return self.remembered(("electric",), lambda: electric_of(self.scene, self.state))
 
     @property
     def potential(self) -> Potential:
@@ -412,6 +407,8 @@ class Equilibrium:
             For an unknown control.
         """
         held = control_kind(control).name
+        if held == "center_height":
+            check_height("control", self.potential)
 
         def estimate() -> ErrorEstimate:
             verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
@@ -491,11 +488,27 @@ class Equilibrium:
 
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:
-    s = np.atleast_1d(np.asarray(r, dtype=float))
+    allowed = f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed"
+    try:
+        s = np.atleast_1d(np.asarray(r, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("r", r, allowed) from None
     margin = LEAST_LENGTH * float(ends[-1])  # a computed end is exact to round-off only
-    if not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
-        raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
+    if s.ndim != 1 or not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
+        raise InputError("r", r, allowed)
     return np.clip(s, ends[0], ends[-1])
+
+
+def electric_of(scene: Scene, x: Array) -> dict[str, float]:
+    """Voltage, charge, capacitance and largest field of a state; electrodes without a voltage or charge have a capacitance as well."""
+    from ..potential import potential_of
+
+    own = scene.electric
+    if own is None or scene.electricity is not None:
+        return potential_of(scene).electric_quantities(x)
+    plain = replace(own.plain(scene.scales), **{own.load: 1.0})
+    found = potential_of(scene.replace(electric=plain, scales=None)).electric_quantities(x)
+    return {**dict.fromkeys(found, 0.0), "capacitance": found["capacitance"]}
 
 
 def recorded(

@@ -20,11 +20,12 @@ from ..results.tipped import TippedPoint as Fold
 from ..scene import Scene
 from ..scene.run import GAS
 from ..solve.continuation import StepControl, Tracer, trace_points
+from ..solve.controls import check_height
 from ..solve.segment import Segment
 from ..solve.state import Predictor
 from ..solve.tipped import TippedPoint, TippedProblem, compressed
 from ..stability.azimuthal import onset_mode
-from .arguments import check_height, check_max_steps
+from .arguments import check_max_steps
 from .trace_run import checked_targets
 
 #: harmonics to begin with, how many are added at a time, and the most

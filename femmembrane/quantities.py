@@ -247,7 +247,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "fraction_double": Quantity("part of the reference area with wrinkles both ways (s11 < 0 and s22 < 0)"),
     "error_pressure": Quantity("estimated error of the pressure, relative"),
     "error_volume": Quantity("estimated error of the volume, relative"),
-    "error_energy": Quantity("estimated error of elastic plus magnetic energy, over the sum of their sizes"),
+    "error_energy": Quantity("estimated error of the total energy, over the sum of the sizes of its parts"),
     "estimated": Quantity("quantity whose error is estimated"),
     "error_value": Quantity("quantity at the equilibrium whose error is estimated"),
     "error_estimate": Quantity("its estimated error, signed"),

@@ -164,6 +164,7 @@ def _columns(problem: Problem, estimate: Estimate, spread: Spread, half: float) 
                     np.maximum(np.einsum("ip,pq,iq->i", J, np.where(np.isfinite(spread.covariance), spread.covariance, 0.0), J), 0.0)
                 )
             against = factors.get(test.target, 1.0)
+            own = next((b for b in test.blocks if b.name == test.target), None)
             found.append(
                 FittedColumn(
                     test=test.name,
@@ -172,6 +173,8 @@ def _columns(problem: Problem, estimate: Estimate, spread: Spread, half: float) 
                     against=test.target,
                     against_header=headers.get(test.target, test.target),
                     held=_frozen(targets[block.state] / against),
+                    held_measured=_frozen((targets if own is None else own.measured)[block.state] / against),
+                    held_deviation=_frozen((np.zeros(test.count) if own is None else own.deviation)[block.state] / against),
                     measured=_frozen(block.measured / unit),
                     predicted=_frozen(value / unit),
                     deviation=_frozen(block.deviation / unit),

@@ -100,6 +100,10 @@ class Branch(Sequence[Equilibrium]):
     hold: Mapping[str, float] = field(default_factory=dict)
     _drawn: list[BranchCurve] = field(default_factory=list, init=False, repr=False)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy has: what was found for drawing belongs to potentials, which are built anew in another process."""
+        return {**vars(self), "_drawn": []}
+
     def __len__(self) -> int:
         return len(self.equilibria)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
-    from ..solve.controls import Gas
+    from ..solve.controls import Control, Gas
     from ..solve.sensitivity import Rates, Sensitive
     from ..stability.profile import Profile
     from .branch import Branch
@@ -106,6 +106,13 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     from ..accuracy.error_estimate import estimate_errors
 
     return estimate_errors(potential, x, pressure, control, verdicts)
+
+
+def on_borders(eq: Equilibrium, held: Control) -> Equilibrium:
+    """See :meth:`.Equilibrium.on_borders`."""
+    from ..accuracy.borders import equilibrium_on_borders
+
+    return equilibrium_on_borders(eq, held)
 
 
 def estimate_place(point: SpecialPoint) -> PlaceEstimate:

@@ -79,7 +79,8 @@ class FittedColumn:
         What it is, and how the table calls it.
     against, against_header : str
         What is held where it is predicted.
-    held : ndarray, shape (n,)
+    held, held_measured, held_deviation : ndarray, shape (n,)
+        Where the prediction is made; what was measured there, and its standard deviation, 0 where it is exact or was not measured.
     measured, predicted, deviation : ndarray, shape (n,)
         Deviation is the standard deviation of a measurement.
     residual : ndarray, shape (n,)
@@ -98,6 +99,8 @@ class FittedColumn:
     against: str
     against_header: str
     held: Array
+    held_measured: Array
+    held_deviation: Array
     measured: Array
     predicted: Array
     deviation: Array

@@ -17,7 +17,8 @@ import numpy as np
 
 from ..checks import choice, convert
 from ..discretization.space import Space
-from ..potential import Array, Evaluation
+from ..errors import InputError
+from ..potential import Array, Evaluation, Potential
 from ..quantities import heading
 from ..scene.run import MINIMISED, PRESCRIBED
 
@@ -211,6 +212,14 @@ class GasOver(Gas):
             Of the state.
         """
         return pressure + self.atmosphere if self.varies == "chamber" else volume + self.chamber
+
+
+def check_height(key: str, potential: Potential) -> None:
+    """Raise InputError where the height of the first point of the meridian is held, and cannot be prescribed."""
+    if potential.space.pole == potential.space.n_free:
+        raise InputError(
+            key, "a height", f"the first end of this {potential.scene.mesh.shape} is held along the axis; prescribe a volume or a pressure"
+        )
 
 
 def at_number(control: Control, number: float) -> Control:

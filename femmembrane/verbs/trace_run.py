@@ -23,14 +23,14 @@ from ..solve.active_set import contact_events
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
-from ..solve.controls import CONTROLS
+from ..solve.controls import CONTROLS, check_height
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
 from ..solve.start import start_at_volume, usual_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..stability.azimuthal import azimuthal_eigenvalue
-from .arguments import check_height, check_ill_posed, check_max_steps
+from .arguments import check_ill_posed, check_max_steps
 from .meshing import carried
 from .over_number import gas_of
 from .running import End, Request, Run
@@ -152,8 +152,8 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
 def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     if point.kind == "azimuthal_onset":
         message = (
-            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
-            "folds and equilibria are allowed"
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed here; fm.trace follows them "
+            "without a number or a quantity held; branch points, folds and equilibria are allowed"
         )
         raise InputError("start", "azimuthal_onset", message)
     return point.equilibrium

@@ -15,12 +15,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..errors import InputError
 from ..files import replace_file
 from .backend import drawing, load, title_text
 from .journal import fit, layout
+from .labels import covered, settle
 from .zones import zone_order
 
 if TYPE_CHECKING:
@@ -199,6 +198,7 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
     Text in SVG and PDF files stays text, which programs for drawing can edit.
     """
     fit(figure)
+    settle(figure)
     if path is not None:
         formats = figure.canvas.get_supported_filetypes()
         if Path(path).suffix[1:].lower() not in formats:
@@ -261,17 +261,7 @@ def covers(legend: Any, axes: Axes) -> bool:
     figure = legend.get_figure(root=True)
     figure.draw_without_rendering()
     box = legend.get_window_extent().padded(_CLEAR * figure.dpi / 72)
-    lines = (line for line in axes.lines if line.get_visible() and np.size(line.get_xdata()) and line.get_transform() == axes.transData)
-    paths = (line.get_transform().transform_path(line.get_path()) for line in lines)
-    return any(_meet(path, box) for path in paths) or any(box.overlaps(text.get_window_extent()) for text in axes.texts if text.get_text())
-
-
-def _meet(path: Any, box: Any) -> bool:
-    """Whether a path enters a box; ends that are not finite cut it."""
-    points = path.vertices
-    pieces = np.split(points, np.flatnonzero(~np.isfinite(points).all(axis=1)))
-    parts = [piece[np.isfinite(piece).all(axis=1)] for piece in pieces]
-    return any(box.count_contains(part) > 0 or (len(part) > 1 and type(path)(part).intersects_bbox(box, filled=False)) for part in parts)
+    return covered(axes, box) > 0 or any(box.overlaps(text.get_window_extent()) for text in axes.texts if text.get_text())
 
 
 #: height in inches that a figure of this package had before a legend stood below its axes, and the heights of these legends

@@ -76,7 +76,8 @@ def _draw(axes: Axes, column: FittedColumn, several: bool) -> None:
         )
         axes.plot(fine, curve, label="fitted", **line)
     look: dict[str, Any] = {"fmt": "o", "color": "#222222", "markersize": 4, "elinewidth": 1.0, "zorder": 3}
-    axes.errorbar(x, column.measured, yerr=column.deviation, label="measured", **look)
+    spread = column.held_deviation if column.held_deviation.any() else None
+    axes.errorbar(column.held_measured, column.measured, yerr=column.deviation, xerr=spread, label="measured", **look)
     axes.set_ylabel(column.header)
     if several:
         axes.set_title(column.test.rpartition("/")[2], fontsize=9)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..quantities import PLACES, title, words
 from ..results.branch import Branch
-from ..results.error_estimate import ESTIMATED
 from ..results.folds import FOLD_NAMES
 from . import plots
 from .branch_lines import COLORS
@@ -99,7 +98,7 @@ def fold_curve_html(curve: FoldCurve) -> str:
 
 def error_estimate_html(estimate: ErrorEstimate) -> str:
     """A table of values and their errors."""
-    rows = [[words(name), d.value, d.error, d.relative] for name in ESTIMATED for d in [getattr(estimate, name)]]
+    rows = [[words(name), d.value, d.error, d.relative] for name in estimate.shown for d in [getattr(estimate, name)]]
     caption = f"Errors at the same {words(estimate.control)}; {estimate.method}"
     reason = f"<p>{escape(estimate.reason)}</p>" if estimate.reason else ""
     return table(["", "value", "error", "relative"], rows, caption=caption) + reason

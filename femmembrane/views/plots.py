@@ -32,6 +32,7 @@ from .figures import (
     show_in_notebooks,
     verdict_style,
 )
+from .labels import add_label
 from .meridians import draw_profile, draw_surroundings
 from .zones import fill_zones
 
@@ -52,6 +53,7 @@ __all__ = [
     "UNSTABLE",
     "VOLUME_ONLY",
     "Style",
+    "add_label",
     "after",
     "answer",
     "draw_branch",

@@ -99,10 +99,11 @@ def folder_of(script: str) -> Path:
 
 
 def arguments(gallery_conf: dict[str, Any], script_vars: dict[str, Any]) -> list[str]:
-    """Every demo writes into a folder of its own. sphinx-gallery asks before it runs a script."""
+    """Every demo writes into a folder of its own. sphinx-gallery asks before it runs a script, which is to know its own name and words."""
+    script = Path(script_vars["src_file"])
+    docstring = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8")))
+    script_vars["example_globals"].update(__file__=str(script), __doc__=docstring)
     out = folder_of(script_vars["src_file"])
-    if Path(script_vars["src_file"]).stem in ("paper", "printed_equations"):
-        return []
     shutil.rmtree(out, ignore_errors=True)
     return ["--out", str(out)]
 

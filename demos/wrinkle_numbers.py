@@ -8,8 +8,8 @@ Every number n of waves around the axis then has an eigenvalue, and one n has th
    the hoop stress is compressive. The states of figure 7, and those of figure 9 at large volumes, do not wrinkle: the worst is n = 1.
 2. The pole falls, and the first of all numbers n >= 3 becomes unstable: where, and which, for three thicknesses. (The membrane may tip
    over or turn oval before, with n = 1 or 2: that hardly depends on its thickness.) The thinner the sheet, the sooner it wrinkles, and in
-   figure 8a n grows about like (R0/T)^(2/3), as the compressed zone has just opened. In figure 8b the thinnest sheet has three lobes before it has short wrinkles. Deep
-   in the wrinkled states n grows like R0/T, and eigenvalues like its square.
+   figure 8a n grows about like (R0/T)^(2/3), as the compressed zone has just opened. In figure 8b the thinnest sheet has three lobes
+   before it has short wrinkles. Deep in the wrinkled states n grows like R0/T, and eigenvalues like its square.
 
     python demos/wrinkle_numbers.py                tables and picture in out/wrinkle_numbers, 30 seconds
     python demos/wrinkle_numbers.py --quick        fewer states and thicknesses

@@ -189,7 +189,7 @@ def _across(potential: Potential, eq: Equilibrium, scale: float) -> float:
     """Estimated relative error of P next to folds of volume and height: the distance to the branch of a finer space there."""
     evaluation = potential.evaluate(eq.state, eq.pressure)
     state = State(eq.state, eq.pressure, evaluation, 0, 0.0, 0.0, 0.0)
-    met = met_across(potential_of(finer_space(potential, evaluation)[0]), potential, first_point(potential, state, 1))
+    met = met_across(potential_of(finer_space(potential, evaluation, eq.pressure)[0]), potential, first_point(potential, state, 1))
     return abs(met.pressure - eq.pressure) / max(abs(eq.pressure), scale) if met.status is Status.CONVERGED else np.nan
 
 
@@ -337,7 +337,7 @@ def relative_error(potential: Potential, x: Array, pressure: float, controls: Se
     evaluation = potential.evaluate(x, pressure)
     if ill_posed(potential, evaluation) is not None:
         return np.nan
-    finer = potential_of(finer_space(potential, evaluation)[0])
+    finer = potential_of(finer_space(potential, evaluation, pressure)[0])
     errors = []
     for control in _can_hold(controls, potential):
         better = same_state(finer, potential, x, pressure, evaluation, control)[0]

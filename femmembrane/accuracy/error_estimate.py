@@ -2,8 +2,8 @@
 
 Values converge at order 2 p for elements of degree p, so that values of degree p + 1 are exact beside them. The difference of the two is
 the error, to a few digits. The idea is Bank & Weiser's hierarchical one, with the nonlinear problem solved whole. This fails in a wrinkled
-tension field: borders of zones lie inside elements, and the errors that they cause fall with the size of the elements alone. There the
-finer space has quartered elements of one degree more.
+tension field where borders of zones lie inside elements: the errors that they cause fall with the size of the elements alone. There the
+finer space has quartered elements of one degree more. It holds again where every border is an end of elements (:mod:`.borders`).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from ..solve.wellposed import ill_posed
 from ..stability.profile import profile_at
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import axisymmetric_verdict
+from ..stability.zones import on_its_borders
 
 #: the degree whose stresses, from slopes that are recovered, are about as good as those of one degree more
 _RECOVERED = 3
@@ -53,7 +54,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     control = control_kind(control).name
     evaluation = potential.evaluate(x, pressure)
     values = _numbers(potential, x, pressure, evaluation, verdicts)
-    scene, method = finer_space(potential, evaluation)
+    scene, method = finer_space(potential, evaluation, pressure)
     bad = ill_posed(potential, evaluation)
     if bad is not None:
         return _without(control, values, method, f"not estimated: {bad}, and what a mesh finds depends on the mesh")
@@ -88,11 +89,11 @@ def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evalua
     }
 
 
-def finer_space(potential: Potential, evaluation: Evaluation) -> tuple[Scene, str]:
+def finer_space(potential: Potential, evaluation: Evaluation, pressure: float) -> tuple[Scene, str]:
     """The scene on finer elements, and in words."""
     scene = potential.scene
     better = finer_scene(scene)
-    if scene.tension_field and (evaluation.stress <= 0).any():
+    if scene.tension_field and (evaluation.stress <= 0).any() and not on_its_borders(scene, evaluation.x, pressure):
         better = scene.replace(mesh=scene.mesh.refined().refined(), degree=min(scene.degree + 1, MAX_DEGREE))
         what = f"quartered elements of degree {better.degree}, for borders of wrinkled zones inside elements: rough"
     else:

@@ -47,7 +47,7 @@ def estimate_place(potential: Potential, x: Array, pressure: float, kind: str, a
     """
     evaluation = potential.evaluate(x, pressure)
     values = _numbers(potential, x, pressure, evaluation.volume)
-    scene, method = finer_space(potential, evaluation)
+    scene, method = finer_space(potential, evaluation, pressure)
     method = method.replace("against the same load", "the point located again")
     if kind not in _ZERO:
         return place_from_numbers(values, None, method, f"not estimated: a {kind.replace('_', ' ')} is not located again")

@@ -87,6 +87,9 @@ class Bulge:
     """
 
     def __init__(self, law: Law, scene: Scene, held: str) -> None:
+        if scene.obstacles:
+            allowed = "a scene without obstacles is allowed in a fit: its predictions have no derivatives while the border of contact moves"
+            raise InputError("obstacle", scene.obstacles[0], allowed)
         self.law, self.scene, self.held = law, scene, held
         self.control = CONTROLS[held]
         self.why = ""

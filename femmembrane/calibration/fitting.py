@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from ..errors import InputError, Status
-from ..results.fit import Correlation, Fit, FittedColumn
+from ..results.fit import Correlation, Fit, FittedColumn, percent
 from .bulge import Bulge
 from .design import errors_of
 from .laws import Law
 from .least_squares import Estimate, Problem
 from .measured import Measured
+from .resampling import refits
 from .simple import Simple
 from .statistics import (
     DETERMINED,
@@ -34,6 +36,8 @@ Array = NDArray[np.float64]
 #: confidence of intervals and bands
 LEVEL = 0.95
 INTERVALS = ("auto", "linear", "profile")
+#: seed of data sets that are drawn
+_SEED = 7
 #: probability of a larger scatter below which the deviations that were given are questioned
 _IMPROBABLE = 1e-3
 #: how many times the largest height of the data a further test is looked for, and how many heights are tried
@@ -58,7 +62,7 @@ def check_count(law: Law, problem: Problem) -> None:
         raise InputError("data", f"{count} rows", allowed)
 
 
-def fitted(law: Law, tests: Sequence[Measured], *, starts: int, intervals: str, check: bool = True, advise: bool = True) -> Fit:
+def fitted(law: Law, tests: Sequence[Measured], *, starts: int, intervals: str, advise: bool = True, samples: int = 0) -> Fit:
     """Fit the numbers of a law to tests.
 
     Raises
@@ -69,7 +73,7 @@ def fitted(law: Law, tests: Sequence[Measured], *, starts: int, intervals: str, 
     clock = time.perf_counter()
     problem = Problem(law, tests)
     check_count(law, problem)
-    estimate = problem.estimate(starts, check)
+    estimate = problem.estimate(starts)
     values, spread = estimate.point.values, spread_of(estimate.point.jacobian, estimate.point.values)
     half = quantile(LEVEL, problem.freedom, problem.has_unknown)
     linear = linear_intervals(problem, estimate, spread, half)
@@ -84,7 +88,7 @@ def fitted(law: Law, tests: Sequence[Measured], *, starts: int, intervals: str, 
     chi_square = estimate.cost
     pair = {name: (float(a), float(b)) for name, (a, b) in zip(names, found, strict=True)}
     straight = {name: (float(a), float(b)) for name, (a, b) in zip(names, linear, strict=True)}
-    return Fit(
+    fit = Fit(
         scene=law.fitted_scene(values),
         parameters=names,
         values=dict(zip(names, map(float, values), strict=True)),
@@ -109,6 +113,14 @@ def fitted(law: Law, tests: Sequence[Measured], *, starts: int, intervals: str, 
         seconds=time.perf_counter() - clock,
         evaluations=problem.evaluations,
     )
+    return replace(fit, samples=_drawn(problem, values, samples)) if samples else fit
+
+
+def _drawn(problem: Problem, values: Array, count: int) -> dict[str, Array]:
+    """Numbers of fits to data sets drawn around the result."""
+    found = [refit.estimate.point.values for refit in refits(problem, values, count, _SEED) if refit is not None]
+    columns = np.array(found).reshape(-1, len(values)).T
+    return {name: _frozen(column) for name, column in zip(problem.law.names, columns, strict=True)}
 
 
 def _frozen(array: Array) -> Array:
@@ -152,6 +164,7 @@ def _columns(problem: Problem, estimate: Estimate, spread: Spread, half: float) 
                     np.maximum(np.einsum("ip,pq,iq->i", J, np.where(np.isfinite(spread.covariance), spread.covariance, 0.0), J), 0.0)
                 )
             against = factors.get(test.target, 1.0)
+            own = next((b for b in test.blocks if b.name == test.target), None)
             found.append(
                 FittedColumn(
                     test=test.name,
@@ -160,6 +173,8 @@ def _columns(problem: Problem, estimate: Estimate, spread: Spread, half: float) 
                     against=test.target,
                     against_header=headers.get(test.target, test.target),
                     held=_frozen(targets[block.state] / against),
+                    held_measured=_frozen((targets if own is None else own.measured)[block.state] / against),
+                    held_deviation=_frozen((np.zeros(test.count) if own is None else own.deviation)[block.state] / against),
                     measured=_frozen(block.measured / unit),
                     predicted=_frozen(value / unit),
                     deviation=_frozen(block.deviation / unit),
@@ -209,7 +224,7 @@ def _verdict(law: Law, problem: Problem, values: Array, spread: Spread, estimate
         count = int((spread.singular_values > 1 / DETERMINED).sum())
         seen = f" (only {count} of {len(values)} combinations of these numbers are)" if count else ""
         return False, f"not determined by these data{seen}{advice}"
-    named = " and ".join(f"{c.name} (to {100 * c.error:.2g} %)" for c in combinations)
+    named = " and ".join(f"{c.name} (to {percent(c.error)})" for c in combinations)
     verb = "is" if len(combinations) == 1 else "are"
     return False, f"only {named} {verb} determined; {', '.join(short_name(law.names[k]) for k in bad)} not determined by these data{advice}"
 

@@ -336,6 +336,8 @@ class Law:
 
     def _material(self, numbers: dict[str, float]) -> tuple[Any, float]:
         """The material over its shear modulus, and this."""
+        if not self.model:  # of the user's own, with nothing to change
+            return self.scene.material, numbers["mu"]
         if self.model == "ogden":
             count = len(self.scene.material.mu)  # type: ignore[attr-defined]
             mu, alpha = (np.array([numbers[f"{key}.{k}"] for k in range(count)]) for key in ("mu", "alpha"))

@@ -239,9 +239,9 @@ class Problem:
 
     # --- the whole fit
 
-    def estimate(self, starts: int, check: bool = True) -> Estimate:
+    def estimate(self, starts: int) -> Estimate:
         """The best of several starts, with all weights in agreement with it."""
-        first = self._first_start(check)
+        first = self._first_start()
         best: Estimate | None = None
         failure: SolveError | None = None
         for start in self._starts(first, starts):
@@ -256,17 +256,15 @@ class Problem:
             raise failure or SolveError("no start has a prediction", status=Status.NOT_CONVERGED)
         return self.on_bounds(self.reweighted(best))
 
-    def _first_start(self, check: bool) -> Array:
+    def _first_start(self) -> Array:
         """The numbers of the scene, with moduli by which predictions are as large as the data."""
         law = self.law
         values = law.from_coordinates(_strictly_inside(law.to_coordinates(law.start), *law.bounds))
-        if check:
-            check_sizes(self.tests)
+        check_sizes(self.tests)
         point = self.at(values)
         if point is None:
             return values
-        if check:
-            check_units(self.tests, point.predictions)
+        check_units(self.tests, point.predictions)
         moduli = [k for k, name in enumerate(law.names) if law.is_modulus(name)]
         ratios = [
             block.measured / value

@@ -2,8 +2,8 @@
 
 Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
 full disk, too little memory), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
-In a pipe nothing is printed but errors, one line each on stderr. There is one module a command. Slow imports stand inside its functions, so
-that ``--help`` answers at once.
+What was written is said on stdout, also in a pipe; errors are one line each on stderr. There is one module a command. Slow imports stand
+inside its functions, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from ..errors import InputError
@@ -46,8 +45,7 @@ def explore(
     if changes:
         raise InputError("--set", changes[0], "allowed with --live only: a finished run has its scene")
     page = write(source, out, units or "scaled")
-    if sys.stdout.isatty():
-        say(f"written:\n  {page}\n")
+    say(f"written:\n  {page}\n")
     return DONE
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -94,6 +93,9 @@ def run(
                 written.append(write_report(out, units=system))
             if explore and len(branch):
                 written.append(write_explorer(out, units=system))
+        except KeyboardInterrupt:  # the second one
+            checkpoints.save()
+            return fail(INTERRUPTED, f"interrupted while results were written to {out}: some are missing; --resume writes them")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, _kept(error, checkpoints, out))
         if code != INTERRUPTED:
@@ -103,8 +105,7 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    if sys.stdout.isatty():
-        say(_summary(branch, written))
+    say(_summary(branch, written))
     return DONE
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 from ..errors import InputError
@@ -90,8 +89,7 @@ def new(name: str, /) -> int:
     except (OSError, ValueError) as error:
         reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
         raise InputError("name", name, f"{path} cannot be written ({reason})") from None
-    if sys.stdout.isatty():
-        say(f"written: {path}\nNext: femmembrane run {path} --out out\n")
+    say(f"written: {path}\nNext: femmembrane run {path} --out out\n")
     return DONE
 
 

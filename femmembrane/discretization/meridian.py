@@ -20,6 +20,7 @@ import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Protocol, Self, TypeAlias
 
 import numpy as np
@@ -343,6 +344,67 @@ def like(ends: Sequence[float], elements: int) -> Array:
     """Ends of another number of elements that are the same function of k/elements, linear between the given ones."""
     n = len(ends) - 1
     return np.interp(np.linspace(0, n, elements + 1), np.arange(n + 1), ends)
+
+
+def on_borders(mesh: Any, places: Array, fixed: Sequence[float] = ()) -> Any:
+    """A mesh with ends of elements moved to places along it, and the others carried along with them.
+
+    Parameters
+    ----------
+    mesh : Meridian
+    places : ndarray
+        Increasing, between its first end and its last.
+    fixed : sequence of float
+        Ends that have to stay.
+
+    Raises
+    ------
+    InputError
+        For more places than there are ends to move.
+    """
+    ends = mesh.breakpoints()
+    moved = through(ends, places, fixed)
+    return mesh if moved is ends else mesh.on_ends(moved)
+
+
+def through(ends: Array, places: Array, fixed: Sequence[float] = ()) -> Array:
+    """Ends of as many elements with some of them at given places: those that lie nearest, counted in elements. What is between two places
+    is divided as before."""
+    near = LEAST_LENGTH * (ends[-1] - ends[0])
+    held = [k for k, end in enumerate(ends) if k in (0, ends.size - 1) or any(abs(end - s) <= near for s in fixed)]
+    free = [float(s) for s in places if all(abs(s - ends[k]) > near for k in held) and all(abs(s - f) > near for f in fixed)]
+    if not free:
+        return ends
+    pairs = [(k, float(ends[k])) for k in held]
+    for first, last in pairwise(held):
+        between = [s for s in free if ends[first] < s < ends[last]]
+        count = np.interp(between, ends, np.arange(ends.size))
+        if len(between) > last - first - 1:
+            allowed = f"more are needed: the membrane has {len(between) + 1} zones where this mesh has {last - first} elements"
+            raise InputError("mesh.elements", ends.size - 1, allowed)
+        pairs += zip(_nearest(count, first + 1, last - 1), between, strict=True)
+    index, at = zip(*sorted(pairs), strict=True)
+    moved = np.interp(np.arange(ends.size), index, at)
+    moved[list(index)] = at
+    return moved
+
+
+def _nearest(count: Array, first: int, last: int) -> list[int]:
+    """Whole numbers from ``first`` to ``last``, strictly increasing, next to given increasing ones by the sum of squares."""
+    offers = np.arange(first, last + 1)
+    rows = (count[:, None] - offers) ** 2
+    best, choices = np.zeros(offers.size + 1), []
+    for row in rows[::-1]:  # the least that the places from here on cost, if only offers from each one on are left
+        total = row + best[1:]
+        least = np.minimum.accumulate(total[::-1])[::-1]
+        choices.append(total)
+        best = np.append(least, np.inf)
+    found, at = [], 0
+    for total in choices[::-1]:
+        at += int(np.argmin(total[at:]))
+        found.append(int(offers[at]))
+        at += 1
+    return found
 
 
 def check_accuracy(mesh: Any, places: str, *, given: bool) -> None:

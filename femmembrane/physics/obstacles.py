@@ -160,7 +160,7 @@ class Obstacle:
         lines = []
         for piece in self.pieces():
             if isinstance(piece, Straight):
-                ends = np.array([max(piece.low, -reach), min(piece.high, reach)])
+                ends = np.array([-reach if math.isinf(piece.low) else piece.low, reach if math.isinf(piece.high) else piece.high])
                 lines.append(np.array([[p + d * t for t in ends] for p, d in zip(piece.start, piece.along, strict=True)]))
             elif piece.radius > 0:
                 half, middle = math.acos(max(-1.0, piece.cosine)), math.atan2(piece.middle[1], piece.middle[0])

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 #: force that holds a node, over the largest forces that meet at a node, that is round-off
 NO_FORCE = 1e-11
+#: and that is too little to say whether a perturbation would lift the node off
+_WEAK = 1e-8
 #: part of its neighbour's normal by which a node must be able to move for a body to hold it
 _ACROSS = 1e-6
 
@@ -223,6 +225,15 @@ class ContactEvaluation(Evaluation):
     def row(self, row: Array) -> Array:
         potential = cast(ContactPotential, self.potential)
         return np.asarray(row @ potential.to_root) if potential.borders else row
+
+    def released(self) -> ContactEvaluation | None:
+        potential = cast(ContactPotential, self.potential)
+        u, w = self._raw.force_scale(0.0)
+        least = _WEAK * (np.abs(self.gaps.n_rho) * u + np.abs(self.gaps.n_eta) * w)
+        weak = self.held & (potential.with_poles(self.forces) <= least)
+        if not weak.any():
+            return None
+        return ContactEvaluation(self._raw, potential, self.gaps, self.held & ~weak)
 
     def holds(self, unknown: int) -> bool:
         return bool((self.reduction.out == unknown).any())

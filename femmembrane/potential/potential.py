@@ -156,6 +156,10 @@ class Evaluation:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row
 
+    def released(self) -> Evaluation | None:
+        """The same state without the nodes that bodies hold by no force; None where there are none."""
+        return None
+
     def holds(self, unknown: int) -> bool:
         """Whether a body keeps an unknown from changing."""
         return False
@@ -602,6 +606,11 @@ class Potential:
             hessian, gradient = ca.hessian(density, y)
             density, gradient, hessian = near.placed(density, gradient, hessian)
         return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
+
+    @property
+    def field_operations(self) -> int:
+        """Number of elementary operations of :meth:`field_energy` at one point."""
+        return int(self._field_energy_function.n_instructions())
 
     @property
     def tilts(self) -> bool:

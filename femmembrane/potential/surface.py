@@ -41,8 +41,10 @@ ORDER = 4
 #: difference of the logarithmic strains below which W is interpolated in y, at so many places: with the nearest singularity at y = -1 the
 #: error of the interpolant is that of round-off
 _CLOSE, _PLACES = 0.2, 8
+#: operations of the second derivatives of a field from which on more derivatives are differences
+_LONG = 500
 #: distance between places for differences, over that from the sources, and weights of the places from -3 to 3
-_STEP = 0.02
+_STEP = 0.01
 _FIRST = (-1 / 60, 3 / 20, -3 / 4, 0.0, 3 / 4, -3 / 20, 1 / 60)
 _SECOND = (1 / 90, -3 / 20, 3 / 2, -49 / 18, 3 / 2, -3 / 20, 1 / 90)
 #: exponents of the Taylor coefficients of a function of two numbers
@@ -65,7 +67,7 @@ def refusal(potential: Potential) -> str:
         return "the lid across an end that moves in its plane does not stay flat"
     if getattr(scene, "bending", False):
         return "the stiffness of bending is known to second order only"
-    if getattr(scene, "obstacles", ()):
+    if getattr(scene, "bodies", ()):
         return "the membrane may touch an obstacle"
     return ""
 
@@ -150,14 +152,15 @@ class Expansions:
         """Coefficients of m in (r, z) by :data:`EXPONENTS`, and of g in z, shapes (15, ...) and (5, ...)."""
         found = at_points(self._position, rho, eta).reshape(-1, *rho.shape)
         position, projected = found[: len(EXPONENTS)], found[len(EXPONENTS) :]
-        if self._written_out:
+        if self._long:
             position = self._from_second_derivatives(rho, eta)
         return position, projected
 
     @property
-    def _written_out(self) -> bool:
-        """Whether a source has its derivatives written out up to the second, since formulas of more would be too long."""
-        return any(type(source).jet is not Source.jet for source in self._potential.sources)
+    def _long(self) -> bool:
+        """Whether formulas of the fourth derivatives would be too long, or a source has its derivatives written out up to the second."""
+        sources = self._potential.sources
+        return any(type(source).jet is not Source.jet for source in sources) or bool(sources and self._potential.field_operations > _LONG)
 
     def _from_second_derivatives(self, rho: Array, eta: Array) -> Array:
         """The coefficients of m with differences of its exact second derivatives, of the sixth order in a part of the distance to the
@@ -228,7 +231,7 @@ class Expansions:
         potential, y = self._potential, ca.SX.sym("y", 2)
         with casadi_answers_numpy():
             density = over_reference(potential.loads, y[0], y[1]) + ca.SX(0)
-            if potential.sources and not self._written_out:
+            if potential.sources and not self._long:
                 scene = potential.scene
                 density += position_energy_density(potential.sources, scene.susceptibility or 0.0, scene.saturation, y[0], y[1])
             rows = taylor(density, y[0], y[1])

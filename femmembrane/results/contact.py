@@ -154,6 +154,10 @@ def contact_of(evaluation: Any) -> Contact:
     zones = []
     for first, last in zones_of(potential, own.held):
         held = [place[node] for node in range(first, last + 1) if node in place]
+        # next to an end that is held on the body contact goes on to that end
+        first, last = (
+            end if abs(node - end) == 1 and end not in place else node for node, end in ((first, 0), (last, parameters.size - 1))
+        )
         body = int(own.gaps.body[held[len(held) // 2]])
         start, stop = -(-first // space.degree), last // space.degree  # elements from end to end
         first_s, last_s = float(parameters[first]), float(parameters[last])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
-    from ..solve.controls import Gas
+    from ..solve.controls import Control, Gas
     from ..solve.sensitivity import Rates, Sensitive
     from ..stability.profile import Profile
     from .branch import Branch
@@ -108,6 +108,13 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     return estimate_errors(potential, x, pressure, control, verdicts)
 
 
+def on_borders(eq: Equilibrium, held: Control) -> Equilibrium:
+    """See :meth:`.Equilibrium.on_borders`."""
+    from ..accuracy.borders import equilibrium_on_borders
+
+    return equilibrium_on_borders(eq, held)
+
+
 def estimate_place(point: SpecialPoint) -> PlaceEstimate:
     """See :func:`femmembrane.accuracy.place_estimate.estimate_place`."""
     from ..accuracy.place_estimate import estimate_place
@@ -185,25 +192,25 @@ def draw_zones(axes: Any, branch: Branch) -> Sequence[Any]:
     return draw_zones(axes, branch)
 
 
-def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -> Any:
+def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None, ax: Any = None, y: str = "pressure") -> Any:
     """See :func:`femmembrane.views.folds.plot_fold_curve`."""
     from ..views.folds import plot_fold_curve
 
-    return plot_fold_curve(curve, path)
+    return plot_fold_curve(curve, path, ax=ax, y=y)
 
 
-def plot_convergence(study: Convergence, path: str | PathLike[str] | None, quantities: Sequence[str] | None, against: str) -> Any:
+def plot_convergence(study: Convergence, path: str | PathLike[str] | None, ax: Any, quantities: Sequence[str] | None, against: str) -> Any:
     """See :func:`femmembrane.views.convergence.plot_convergence`."""
     from ..views.convergence import plot_convergence
 
-    return plot_convergence(study, path, quantities=quantities, against=against)
+    return plot_convergence(study, path, ax=ax, quantities=quantities, against=against)
 
 
-def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Any:
+def plot_cost(study: Cost, path: str | PathLike[str] | None = None, ax: Any = None, start: str | None = None) -> Any:
     """See :func:`femmembrane.views.cost.plot_cost`."""
     from ..views.cost import plot_cost
 
-    return plot_cost(study, path)
+    return plot_cost(study, path, ax=ax, start=start)
 
 
 def plot_fit(fit: Fit, path: str | PathLike[str] | None = None) -> Any:
@@ -220,11 +227,17 @@ def write_fit_report(fit: Fit, path: str | PathLike[str]) -> None:
     write_fit_report(fit, path)
 
 
-def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Any:
+def plot_grid(
+    sweep: Sweep,
+    path: str | PathLike[str] | None = None,
+    show: Sequence[str] | None = None,
+    units: str = "scaled",
+    ax: Any = None,
+) -> Any:
     """See :func:`femmembrane.views.grid.plot_grid`."""
     from ..views.grid import plot_grid
 
-    return plot_grid(sweep, path, show, units)
+    return plot_grid(sweep, path, show, units, ax)
 
 
 def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[Path]:

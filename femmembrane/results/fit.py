@@ -27,6 +27,16 @@ _NUMBERS = ("parameter", "value", "unit", "standard_error", "relative_error", "l
 _MODELS = ("model", "numbers", "log_likelihood", "aicc", "bic", "delta_aicc", "weight", "chi_square", "determined", "values", "message")
 
 
+def percent(part: float) -> str:
+    """A relative error as a person reads it."""
+    return f"{100 * part:.0f} %" if part >= 0.995 else f"{100 * part:.2g} %"
+
+
+def _digits(value: float) -> str:
+    """A number with five digits, and no power of ten where it is large."""
+    return f"{float(f'{value:.5g}'):.12g}"
+
+
 @dataclass(frozen=True)
 class Correlation(Mapping[str, Mapping[str, float]]):
     """Correlations by name: ``correlation["a", "b"]``, or ``correlation["a"]["b"]``.
@@ -69,7 +79,8 @@ class FittedColumn:
         What it is, and how the table calls it.
     against, against_header : str
         What is held where it is predicted.
-    held : ndarray, shape (n,)
+    held, held_measured, held_deviation : ndarray, shape (n,)
+        Where the prediction is made; what was measured there, and its standard deviation, 0 where it is exact or was not measured.
     measured, predicted, deviation : ndarray, shape (n,)
         Deviation is the standard deviation of a measurement.
     residual : ndarray, shape (n,)
@@ -88,6 +99,8 @@ class FittedColumn:
     against: str
     against_header: str
     held: Array
+    held_measured: Array
+    held_deviation: Array
     measured: Array
     predicted: Array
     deviation: Array
@@ -142,6 +155,8 @@ class Fit:
     seconds : float
     evaluations : int
         How often all states were solved.
+    samples : mapping of str to ndarray
+        Numbers of the fits to data sets that were drawn, where they were asked for.
 
     Examples
     --------
@@ -178,15 +193,16 @@ class Fit:
     notes: tuple[str, ...]
     seconds: float = field(repr=False)
     evaluations: int = field(repr=False)
+    samples: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         width = max(9, *(len(name) for name in self.parameters))
         lines = [f"{'parameter':<{width}} {'value':>12} {'error':>8}  95 % interval"]
         for name in self.parameters:
             value, error, (low, high) = self.values[name], self.standard_errors[name], self.intervals[name]
-            part = f"{100 * error / abs(value):.2g} %" if error < 10 * abs(value) else "-"
+            part = percent(error / abs(value)) if error < 10 * abs(value) else "-"
             unit = f" {self.units[name]}" if self.units[name] else ""
-            lines.append(f"{name:<{width}} {value:>12.6g} {part:>8}  {low:.5g} to {high:.5g}{unit}")
+            lines.append(f"{name:<{width}} {value:>12.6g} {part:>8}  {_digits(low)} to {_digits(high)}{unit}")
         lines.append(self.verdict)
         return "\n".join([*lines, *self.notes])
 

@@ -23,10 +23,13 @@ class Reduced:
         b, in units of mu T R0^2, of a mode of mass 1 over the reference area, Int |f|^2 dA = 1.
     slope : float
         d lambda/d load along the axisymmetric branch.
+    negative_directions : int
+        Number of axisymmetric perturbations in which the energy falls at the onset already, with the same held.
     """
 
     coefficient: float
     slope: float
+    negative_directions: int = 0
 
 
 @dataclass(frozen=True)
@@ -117,14 +120,14 @@ class Postbuckling:
         """In a sentence."""
         waves = f"{self.azimuthal} wave{'s' if self.azimuthal != 1 else ''} around the axis"
         held = {"volume": "constant volume", "pressure": "constant pressure", "gas": "a constant amount of gas"}[self.control]
+        if self.kind == UNKNOWN:
+            return f"whether the onset of {waves} is gradual or a jump is not known: {self.reason or 'b is zero or no number'}"
+        what = "the waves grow gradually beyond it"
         if self.kind == SUBCRITICAL:
-            return (
-                f"at {held} the onset of {waves} is subcritical (b = {self.coefficient:.4g}): the membrane jumps there, and before it "
-                "the axisymmetric states are stable against small perturbations only"
-            )
-        if self.kind == SUPERCRITICAL:
-            return f"at {held} the onset of {waves} is supercritical (b = {self.coefficient:.4g}): the waves grow gradually beyond it"
-        return f"whether the onset of {waves} is gradual or a jump is not known: {self.reason or 'b is zero or no number'}"
+            what = "the membrane jumps there, and before it the axisymmetric states are stable against small perturbations only"
+        if self.under[self.control].negative_directions:
+            what = "the state there is unstable under axisymmetric perturbations already"
+        return f"at {held} the onset of {waves} is {self.kind} (b = {self.coefficient:.4g}): {what}"
 
 
 def not_an_onset(kind: str) -> InputError:

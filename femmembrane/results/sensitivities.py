@@ -248,6 +248,8 @@ def _listed(key: str, given: Any) -> tuple[str, ...]:
 
 def _known(scene: Scene, to: Any) -> Sensitive:
     """The derivatives of the equations of a scene with respect to numbers that it has."""
+    if scene.bodies:
+        raise InputError("to", to, "sensitivities are not computed beside an obstacle")
     try:
         return sensitive(scene, _listed("to", to))
     except InputError as error:

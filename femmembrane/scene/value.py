@@ -23,7 +23,7 @@ from ..physics.along import Along
 from ..physics.chamber import Chamber
 from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
-from ..physics.magnetics import Source
+from ..physics.magnetics import Source, components
 from ..physics.materials import Material
 from ..physics.named import material_data
 from ..physics.obstacles import Obstacle
@@ -289,7 +289,7 @@ class Scene:
             _check_interface(path, source, ("field", "jet", "intensity", "distance_squared", "passed", "meets", "sees", "refusal"), allowed)
             # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles and bodies may lie between them
             with np.errstate(all="ignore"):
-                finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
+                finite = all(np.all(np.isfinite(component)) for component in components(source, R, Z))
             touched = source.meets(R, Z)
             if touched or not finite:
                 name, reason = source.refusal

@@ -40,6 +40,9 @@ _BALANCED = 1e-13
 _LEAST = 0.1
 #: elements in a zone of contact from which on its borders are followed
 _FEWEST = 2
+#: times that borders are given to other ends of elements, and that zones of a few nodes change; elements beside a followed zone that
+#: belong to it
+_MOST_PASSES, _NEXT = 8, 2
 #: how far beyond the middle between two ends a border may be, over the size of an element, before the other one follows it
 _BEYOND = 0.02
 #: forces that pull, over the largest, and gaps inside a body, over the size of the membrane, that a border in its place may leave
@@ -125,26 +128,41 @@ class Border:
 def _with_borders(once: Once, control: Control, root: ContactPotential, result: NewtonResult) -> NewtonResult | None:
     """The equilibrium with ends of elements at the borders of contact; None where there are none that ends could follow."""
     evaluation = cast("ContactEvaluation", result.evaluation)
-    zones = zones_of(root, evaluation.held)
-    places = np.array([place for zone in zones for place in _estimates(root, evaluation, zone)])
-    if not places.size:
+    zones = [(zone, np.array(_estimates(root, evaluation, zone))) for zone in zones_of(root, evaluation.held)]
+    followed = [(zone, places) for zone, places in zones if places.size and _assigned(root, [zone], places) is not None]
+    if not followed or _assigned(root, [z for z, _ in followed], np.concatenate([s for _, s in followed])) is None:
         return None
+    own, places = [zone for zone, _ in followed], np.concatenate([s for _, s in followed])
+    # other zones, of a node or two, stay as sets of nodes
+    loose = evaluation.held & ~_within(root, own)
     spent, x, pressure = result.iterations, result.x, result.pressure
-    for _ in range(3):
-        borders = _assigned(root, zones, places)
+    for _ in range(_MOST_PASSES):
+        borders = _assigned(root, own, places)
         if borders is None:
             return None
-        found = _moved(once, control, root, evaluation.held, zones, borders, places, x, pressure)
+        found = _moved(once, control, root, loose, own, borders, places, x, pressure)
         if found is None:
             return None
         result, places = found
         spent += result.iterations
         result.iterations = spent
-        again = _assigned(root, zones, places)
-        if again is None or all(a == b or _between(root, a, b, s) for a, b, s in zip(again, borders, places, strict=True)):
-            return result if _in_place(cast("ContactEvaluation", result.evaluation)) else None
-        x, pressure = result.evaluation.carried(result.x), result.pressure
+        evaluation = cast("ContactEvaluation", result.evaluation)
+        potential = cast("ContactPotential", evaluation.potential)
+        following = potential.judged(evaluation._raw, evaluation.gaps, result.pressure) & ~_within(root, own, _NEXT * root.space.degree)
+        again = _assigned(root, own, places)
+        same = again is None or all(a == b or _between(root, a, b, s) for a, b, s in zip(again, borders, places, strict=True))
+        if same and (following == loose).all():
+            return result if _in_place(evaluation) else None
+        x, pressure, loose = evaluation.carried(result.x), result.pressure, following
     return None
+
+
+def _within(root: ContactPotential, zones: list[tuple[int, int]], margin: int = 0) -> Mask:
+    """The nodes in zones, and so many beside them."""
+    found = np.zeros(root.nodes.size, dtype=bool)
+    for first, last in zones:
+        found |= (root.nodes >= first - margin) & (root.nodes <= last + margin)
+    return found
 
 
 def zones_of(root: ContactPotential, held: Mask) -> list[tuple[int, int]]:
@@ -216,7 +234,7 @@ def _moved(
     once: Once,
     control: Control,
     root: ContactPotential,
-    held: Mask,
+    loose: Mask,
     zones: list[tuple[int, int]],
     borders: list[Border],
     places: Array,
@@ -228,7 +246,7 @@ def _moved(
     sizes = np.array([min(ends[b.end] - ends[b.end - 1], ends[b.end + 1] - ends[b.end]) for b in borders])
     low = np.array([ends[b.end - 1] for b in borders]) + _LEAST * sizes
     high = np.array([ends[b.end + 1] for b in borders]) - _LEAST * sizes
-    inside = _held_nodes(root, zones, borders, degree)
+    inside = _held_nodes(root, zones, borders, degree) | loose
     spent = 0
 
     def solved(at: Array) -> tuple[NewtonResult, Array] | None:

@@ -82,7 +82,7 @@ def _worst_verdict(potential: Potential, x: Array, pressure: float, evaluation: 
     except SpectrumError as error:
         return Verdict(None, np.nan, np.nan, control, 1, None, f"not decided: {error}")
     verdict = first if n == 1 else checked_verdict(potential, x, pressure, evaluation, control, n)
-    found = f"n = {n} has the lowest eigenvalue found among 1 to {limit} waves, the most that matter"
+    found = f"n = {n} has the lowest eigenvalue found among 1 to {limit} waves; with more, tension and bending outweigh what drives them"
     return replace(verdict, reason=f"{verdict.reason}; {found}")
 
 

@@ -115,8 +115,15 @@ class _Onset:
             slope = float(force @ tangent) - rate * bend
             if gas is not None and control == "gas":
                 slope /= self.pressure + gas.atmosphere  # the amount changes by so much for each unit of volume
-            under[control] = Reduced(rest + float(force @ w) / 4 - p * bend / 4, slope)
+            under[control] = Reduced(rest + float(force @ w) / 4 - p * bend / 4, slope, self._negative(evaluation, control, gas))
         return Postbuckling(self.n, "", under)
+
+    def _negative(self, evaluation: Evaluation, control: str, gas: Gas | None) -> int:
+        """Number of axisymmetric perturbations in which the energy falls; that of a pear that is at its own onset counts as none."""
+        row = None if control == "pressure" else evaluation.volume_gradient
+        softness = gas.compliance(evaluation.volume) if gas is not None and control == "gas" else 0.0
+        held = pencil_of(evaluation.band, self.potential.mass, self.space.half_bandwidth, row, softness, None)
+        return held.count(-_NEAR * self.scale)
 
     def _doubled(self, third: Array) -> float:
         """r . K^-1 r with r = U3[f, f, .] in displacements of 2n waves, K their second variation over 2 pi in place of pi."""

@@ -53,13 +53,43 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
-    guess = None if guess is None else evaluation.reduced(guess)
-    found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, soft), guess)
-    found = replace(found, mode=evaluation.expanded(found.mode))
+    found = _smallest(potential, evaluation, bending, constraint, soft, guess)
+    if (free := evaluation.released()) is not None:
+        return _between(found, _smallest(potential, free, bending, constraint, soft, guess), control, potential)
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode, bending)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
+
+
+def _smallest(
+    potential: Potential,
+    evaluation: Evaluation,
+    bending: Bending | None,
+    constraint: Array | None,
+    compliance: float,
+    guess: Array | None,
+) -> SmallestEigenvalue:
+    """The smallest eigenvalue of a state, with the nodes held that bodies hold in its evaluation."""
+    start = None if guess is None else evaluation.reduced(guess)
+    found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, compliance), start)
+    return replace(found, mode=evaluation.expanded(found.mode))
+
+
+def _between(held: SmallestEigenvalue, free: SmallestEigenvalue, control: str, potential: Potential) -> Verdict:
+    """The verdict where a body touches and does not press: perturbations may lift the membrane off it, and not push it in.
+
+    The least second variation among these lies between those with the touched points free and held.
+    """
+    among, shape = against(control, 0, potential.electric), partial(mode_shape, potential.space)
+    bounds = f"a body is touched without a force: the smallest eigenvalue is between {free.value:.6g} and {held.value:.6g}"
+    if free.value > free.error:
+        reason = f"stable: energy rises under all {among}; {bounds}"
+        return Verdict(True, free.value, free.error, control, 0, free.negative, reason, free.mode, shape, 0.0)
+    if held.value < -held.error:
+        reason = f"unstable: energy falls in {held.negative} direction(s) among {among}; {bounds}"
+        return Verdict(False, held.value, held.error, control, 0, held.negative, reason, held.mode, shape, 0.0)
+    return Verdict(None, free.value, held.value - free.value, control, 0, None, f"open among {among}: {bounds}", free.mode, shape, 0.0)
 
 
 def axisymmetric_pencil(

@@ -34,6 +34,7 @@ from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
 from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
+from .end_strains import strains_at_ends
 from .profile import profile_at
 
 Array = NDArray[np.float64]
@@ -48,6 +49,10 @@ _ROUNDS, _PARTS = 5, 32
 _WIDE = 4
 #: zones shorter than this part of the meridian are round-off of a border
 _SLIVER = 1e-10
+
+#: distance of a border from an end of elements, over the smaller element there, within which it may be at that end; and the distance that
+#: is none, over the length of the meridian: what the energy decides changes by its third power
+_BESIDE, _ON_END = 0.3, 1e-6
 
 #: how often the line between two equilibria is halved to find where the kinds of zones change
 _HALVINGS = 10
@@ -83,6 +88,8 @@ def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones
     deciding = _deciding(scene, x, pressure, criterion)
     codes, edges = _tiles(space_of_scene(scene), deciding)
     if any(codes):
+        if scene.tension_field and criterion == "mechanical":
+            codes, edges = _snapped(codes, edges, scene, x, pressure)
         codes, edges = _Check(scene, x, pressure, criterion).kept(codes, edges)
     area, deformed = _areas(scene, x, pressure, edges)
     ends = profile_at(scene, x, pressure, edges)
@@ -183,6 +190,52 @@ def _tiles(space: Space, deciding: _Stresses) -> tuple[list[int], Array]:
             starts.append(place)
     new = [k for k in range(len(codes)) if k == 0 or codes[k] != codes[k - 1]]
     return [codes[k] for k in new], np.array([*(starts[k] for k in new), end])
+
+
+def _snapped(codes: list[int], edges: Array, scene: Scene, x: Array, pressure: float) -> tuple[list[int], Array]:
+    """Zones of a tension field with those borders put at ends of elements that are there by the forces.
+
+    Strains, which are less exact than forces and jump at these ends, have their zeros beside them.
+    """
+    space = space_of_scene(scene)
+    at = [int(np.abs(space.ends - edge).argmin()) for edge in edges[1:-1]]
+    inner = list(zip(at, edges[1:-1], strict=True))
+    near = [0 < k < space.n_elements and abs(space.ends[k] - edge) < _BESIDE * _smaller(space, k) for k, edge in inner]
+    if not any(near):
+        return codes, edges
+    there = ends_on_borders(scene, x, pressure)
+    places = [float(space.ends[k] if close and k in there else edge) for (k, edge), close in zip(inner, near, strict=True)]
+    kept: list[tuple[int, float]] = [(codes[0], float(edges[0]))]
+    for code, place in zip(codes[1:], places, strict=True):
+        if place <= kept[-1][1]:
+            kept.pop()
+        if not kept or kept[-1][0] != code:
+            kept.append((code, place))
+    return [code for code, _ in kept], np.array([*(place for _, place in kept), edges[-1]])
+
+
+def on_its_borders(scene: Scene, x: Array, pressure: float) -> bool:
+    """Whether every border of a zone of a tension field is an end of elements."""
+    zones = find_zones(scene, x, pressure, "mechanical")
+    return bool(np.isin([zone.s[1] for zone in zones[:-1]], space_of_scene(scene).ends).all())
+
+
+def ends_on_borders(scene: Scene, x: Array, pressure: float) -> frozenset[int]:
+    """The inner ends of elements, by number, at which a zone of a tension field begins or ends by the forces there."""
+    potential = potential_of(scene)
+    space = potential.space
+    strains = strains_at_ends(potential, potential.evaluate(x, pressure), pressure)
+    middle = np.stack(profile_at(scene, x, pressure, (space.ends[1:] + space.ends[:-1]) / 2).beyond or ())
+    with np.errstate(all="ignore"):
+        value = (strains[:, 1, :-1] + strains[:, 0, 1:]) / 2
+        slope = np.maximum(np.abs(middle[:, :-1] - value) / space.sizes[:-1], np.abs(middle[:, 1:] - value) / space.sizes[1:]) * 2
+        found = np.abs(value) <= _ON_END * (space.ends[-1] - space.ends[0]) * slope
+    return frozenset((np.flatnonzero(found.any(axis=0)) + 1).tolist())
+
+
+def _smaller(space: Space, k: int) -> float:
+    """Size of the smaller of the elements that meet at an inner end."""
+    return float(min(space.sizes[k - 1], space.sizes[k]))
 
 
 def _changes(s: Array, compressive: NDArray[np.bool_], deciding: _Stresses) -> list[tuple[float, int]]:

@@ -25,8 +25,8 @@ from ..scene import Scene
 from ..threads import one_thread
 from .arguments import check_scene
 
-#: most starts of a fit, measurements of a plan
-_MOST_STARTS, _MOST_POINTS = 100, 1000
+#: most starts of a fit, measurements of a plan, data sets that are drawn
+_MOST_STARTS, _MOST_POINTS, _MOST_SAMPLES = 100, 1000, 10**6
 
 
 @one_thread
@@ -39,6 +39,7 @@ def fit(
     units: str | None = None,
     starts: int | None = None,
     intervals: str = "auto",
+    samples: int = 0,
 ) -> Fit:
     """Find the numbers of a scene that suit measured tests best, with intervals, and with what the data do not determine.
 
@@ -67,6 +68,9 @@ def fit(
         Starts of the solver, the first at the scene. Left out: one for a single number, two for two, three for more.
     intervals : {"auto", "linear", "profile"}
         Whether profile likelihood replaces the linearised intervals where they differ, nowhere, or wherever it can be followed.
+    samples : int
+        Fits to so many data sets, drawn around the result with the deviations of the data: the parametric bootstrap. A fit of two numbers
+        to 20 rows takes some 20 ms.
 
     Returns
     -------
@@ -101,7 +105,8 @@ def fit(
     choice("intervals", intervals, INTERVALS)
     law = Law(scene, parameters)
     count = _starts(starts, len(law.names))
-    return fitted(law, measured_tests(law, data, noise, units), starts=count, intervals=intervals)
+    drawn = whole("samples", samples, least=0, most=_MOST_SAMPLES)
+    return fitted(law, measured_tests(law, data, noise, units), starts=count, intervals=intervals, samples=drawn)
 
 
 def _starts(starts: int | None, numbers: int) -> int:

@@ -141,14 +141,9 @@ class TippedRun:
             self._add(last or new)
             if last is not None:
                 return self._result(Status.CONVERGED, "")
-            try:
-                refined = self._refined(new, tracer)
-            except SolveError as error:
-                return self._result(error.status, str(error))
+            refined = self._refined(new, tracer)
             if refined is None:
-                left = self.found[-1].truncation
-                message = f"K = {MOST} harmonics leave out about {left:.1e} R0 of the displacement at V = {new.state.volume:.6g}"
-                return self._result(Status.NOT_RESOLVED, message)
+                return self._result(Status.NOT_RESOLVED, self._unresolved())
             point, leaving = refined, False
         targets = dict(request.targets) or "an end"
         return self._result(Status.STEP_LIMIT, f"{request.max_steps} steps were made without meeting {targets}")
@@ -163,7 +158,7 @@ class TippedRun:
         return new
 
     def _refined(self, point: TippedPoint, tracer: Tracer) -> TippedPoint | None:
-        """The point with as many harmonics as it takes; None where the most are too few."""
+        """The point with as many harmonics as it takes; None where the most are too few, or a state is lost with more of them."""
         if self.request.harmonics is not None:
             return point
         while self._truncation(point) > _TOLERANCE * self.potential.space.unit:
@@ -171,7 +166,10 @@ class TippedRun:
             if order >= MOST:
                 return point if self._truncation(point) <= _MISSED * self.potential.space.unit else None
             finer = self._problem(min(order + _MORE, MOST))
-            new = self.problem.carried(point, finer)
+            try:
+                new = self.problem.carried(point, finer)
+            except SolveError:
+                return None
             own, other = self.problem.tipped.harmonics, finer.tipped.harmonics
             path = Predictor()
             for sigma, z, slope in zip(tracer.path.sigma[:-1], tracer.path.point, tracer.path.slope, strict=False):
@@ -180,6 +178,15 @@ class TippedRun:
             tracer.path, self.problem, point = path, finer, new
             self.found[-1] = self._record(point)
         return point
+
+    def _unresolved(self) -> str:
+        """Why harmonics do not resolve the last state."""
+        last, order = self.found[-1], self.problem.tipped.order
+        message = f"at V = {last.volume:.6g} {order} harmonics leave out about {last.truncation:.1e} R0 of the displacement"
+        if order < MOST:
+            message = f"the state at V = {last.volume:.6g} with {order} harmonics is lost with more of them"
+        where = compressed(self.problem.tipped, last.state)
+        return message if where is None else f"{message}; {where}, where the membrane wrinkles"
 
     def _truncation(self, point: TippedPoint) -> float:
         return truncation(self.problem.tipped.harmonics.sizes(point.state.x))

@@ -152,8 +152,8 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
 def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     if point.kind == "azimuthal_onset":
         message = (
-            f"the states that set in there have {point.azimuthal} wave(s) around the axis, which fm.trace follows; here branch points, "
-            "folds and equilibria are allowed"
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed here; fm.trace follows them "
+            "without a number or a quantity held; branch points, folds and equilibria are allowed"
         )
         raise InputError("start", "azimuthal_onset", message)
     return point.equilibrium
@@ -238,6 +238,8 @@ class TraceRun(Run[Branch]):
 
     def switched(self, start: SpecialPoint) -> BranchPoint:
         """The first point on half of the branch that crosses at a branch point."""
+        if start.equilibrium.contact is not None and start.equilibrium.contact.touching:
+            raise InputError("start", "branch_point", "branches are not switched in contact; an equilibrium or a volume is allowed")
         if start.tangent is None or start.tangent.shape != (self.potential.space.n_free + 1,):
             raise InputError("start", "branch_point", "one of the special_points of a branch of this scene is allowed")
         state = restore(self.potential, start.equilibrium)

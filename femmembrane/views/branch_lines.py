@@ -17,6 +17,7 @@ from ..results.postbuckling import SUBCRITICAL, UNKNOWN
 from ..results.special_point import SpecialPoint
 from ..scene import ALL
 from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
+from .labels import add_label
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
 if TYPE_CHECKING:
@@ -378,4 +379,4 @@ def _draw_special_points(axes: Axes, branch: Branch, shown: _Shown) -> None:
         axes.plot(*places.T, marker, label=new_label(axes, named), zorder=4, **look)
     for point, place in zip(points, shown.at(points), strict=True):
         if point.azimuthal:
-            axes.annotate(f"n = {point.azimuthal}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, zorder=5)
+            add_label(axes, f"n = {point.azimuthal}", place, size=8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from html import escape
 from itertools import pairwise
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..files import replace_file
+from ..quantities import QUANTITIES, axis_label, words
+from ..results.fit import percent
 from .backend import title_text
 from .figures import save_figure, shown_figure
 from .html import pairs, table
@@ -54,7 +57,7 @@ def _title(fit: Fit) -> str:
     for name, value in fit.values.items():
         error, unit = fit.standard_errors[name], f" {fit.units[name]}" if fit.units[name] else ""
         size = abs(error / value) if value else np.inf
-        spread = f" ± {100 * size:.2g} %" if size < 10 else ""
+        spread = f" ± {percent(size)}" if size < 10 else ""
         parts.append(f"{name.removeprefix('material.')} = {value:.4g}{unit}{spread}")
     return ", ".join(parts)
 
@@ -75,8 +78,9 @@ def _draw(axes: Axes, column: FittedColumn, several: bool) -> None:
         )
         axes.plot(fine, curve, label="fitted", **line)
     look: dict[str, Any] = {"fmt": "o", "color": "#222222", "markersize": 4, "elinewidth": 1.0, "zorder": 3}
-    axes.errorbar(x, column.measured, yerr=column.deviation, label="measured", **look)
-    axes.set_ylabel(column.header)
+    spread = column.held_deviation if column.held_deviation.any() else None
+    axes.errorbar(column.held_measured, column.measured, yerr=column.deviation, xerr=spread, label="measured", **look)
+    axes.set_ylabel(_named(column.quantity, column.header))
     if several:
         axes.set_title(column.test.rpartition("/")[2], fontsize=9)
     axes.grid(color="0.9", linewidth=0.6)
@@ -93,13 +97,21 @@ def _curve(x: np.ndarray, y: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray,
     return fine, CubicHermiteSpline(x, y, slope)(fine)
 
 
+def _named(quantity: str, header: str) -> str:
+    """Text at an axis for a column, in the unit that its header ends in: ``pole_height_mm`` is a pole height in mm."""
+    unit = re.fullmatch(r"[a-z_]+?_((?:[munµ]|[kM]|c|d|h)?(?:m[23]?|Pa|l|bar)|psi|mmHg)|[^(\[]*[(\[](.+)[)\]]\s*", header.strip())
+    if header == quantity or unit is None or quantity not in QUANTITIES:
+        return axis_label(quantity) if header == quantity else header
+    return f"{words(quantity)} in {unit[1] or unit[2]}"
+
+
 def _draw_residuals(axes: Axes, column: FittedColumn) -> None:
     axes.axhspan(-1.96, 1.96, color="0.93", zorder=0, linewidth=0)
     axes.axhline(0.0, color="0.4", linewidth=0.8, zorder=1)
     axes.plot(column.held, -column.residual, "o", color=_RED, markersize=4, zorder=2)
     top = max(3.0, 1.1 * float(np.abs(column.residual).max(initial=0.0)))
     axes.set_ylim(-top, top)
-    axes.set_xlabel(column.against_header)
+    axes.set_xlabel(_named(column.against, column.against_header))
     axes.set_ylabel("residual/sd")
     axes.spines[["top", "right"]].set_visible(False)
 
@@ -148,7 +160,7 @@ def _sections(fit: Fit, svg: str) -> Iterator[tuple[str, str]]:
     rows = []
     for name in fit.parameters:
         value, error, (low, high) = fit.values[name], fit.standard_errors[name], fit.intervals[name]
-        relative = f"{100 * error / abs(value):.2g} %" if value and error < 10 * abs(value) else "not determined"
+        relative = percent(error / abs(value)) if value and error < 10 * abs(value) else "not determined"
         kind = "profile likelihood" if name in fit.profiled else "linearised"
         rows.append([f"{name}{f' ({fit.units[name]})' if fit.units[name] else ''}", value, relative, low, high, kind])
     yield "Numbers", table(["number", "value", "standard error", "from", "to", "95 % interval"], rows)

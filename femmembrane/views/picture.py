@@ -360,7 +360,8 @@ def draw_surroundings(plotter: pyvista.Plotter, scene: Scene, box: Box) -> list[
     around, drawn = surroundings(scene, box), []
     for body in around.near:
         for part in _parts(body, 0.1 * box.size):
-            plotter.add_mesh(part, color=_SOURCE, smooth_shading=True, ambient=0.3, **_STILL)
+            look = {"color": "0.6", "opacity": 0.25} if body.rigid else {"color": _SOURCE}
+            plotter.add_mesh(part, smooth_shading=True, ambient=0.3, **look, **_STILL)
             drawn.append(np.asarray(part.points))
     if around.absent:
         corner = tuple(0.03 * length for length in plotter.window_size)

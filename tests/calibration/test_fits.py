@@ -44,7 +44,7 @@ def twenty(law: Law) -> tuple[np.ndarray, np.ndarray]:
 
 
 def problem(material, names, noise="1 %") -> Problem:
-    law = Law(scene(material), names)
+    law = Law(fm.Scene(material=material, mesh=fm.disc(4), degree=4), names)
     heights, pressure = twenty(law)
     return Problem(law, measured_tests(law, {"center_height": heights, "pressure": pressure}, noise, None))
 
@@ -422,6 +422,40 @@ def test_models_side_by_side():
     expected = -2 * fit.log_likelihood + 2 * 2 + 2 * 2 * 3 / (20 - 2 - 1)
     assert model.aicc == pytest.approx(expected, rel=1e-12)
     assert len(str(compared).splitlines()) == 5
+
+
+def test_a_strain_energy_of_ones_own():
+    """Its shear modulus is free like that of any other."""
+    own = fm.StrainEnergy(lambda l1, l2: (l1**2 + l2**2 + (l1 * l2) ** -2 - 3) / 2)
+    found = fm.fit(scene(own), gent_data(), ["material.mu"], noise="1 %", intervals="linear")
+    plain = fm.fit(scene(fm.NeoHookean()), gent_data(), ["scales.shear_modulus"], noise="1 %", intervals="linear")
+    assert found.values["material.mu"] == pytest.approx(plain.values["scales.shear_modulus"], rel=1e-7)
+
+
+def test_a_tension_field():
+    """A sheet whose rim stands too close is no obstacle: its limit and its modulus come back."""
+    truth = scene(fm.Gent(20.0), tension_field=True, prestretch=0.95)
+    volumes = np.linspace(1.0, 3.0, 5)
+    data = {"volume": volumes, "pressure": fm.inflate(truth, volumes=volumes, solver="newton").column("pressure")}
+    start = truth.replace(material=fm.Gent(50.0))
+    found = fm.fit(start, data, ["material.mu", "material.jm"], noise="1 %", starts=1, intervals="linear")
+    assert found.values["material.mu"] == pytest.approx(1.0, rel=1e-6)
+    assert found.values["material.jm"] == pytest.approx(20.0, rel=1e-4)
+
+
+def test_obstacles_are_refused():
+    made = scene(fm.Gent(20.0), obstacles=[fm.Plane(height=0.5)])
+    with pytest.raises(fm.InputError, match="a scene without obstacles"):
+        fm.fit(made, gent_data(), ["material.mu"])
+
+
+def test_data_sets_that_are_drawn():
+    """Their numbers scatter by the standard errors, which 60 of them know to 27 % at three times their own."""
+    found = fm.fit(scene(fm.NeoHookean()), gent_data(), ["material.mu"], noise="1 %", samples=60)
+    drawn = found.samples["material.mu"]
+    assert drawn.shape == (60,)
+    assert drawn.std() == pytest.approx(found.standard_errors["material.mu"], rel=0.3)
+    assert drawn.mean() == pytest.approx(found.values["material.mu"], abs=4 * found.standard_errors["material.mu"] / np.sqrt(60))
 
 
 def test_exact_log_likelihood():

@@ -320,7 +320,7 @@ def test_contact_and_dipole_together():
     assert eq.contact.pressure([0.0])[0] == pytest.approx(0.3 + field, rel=1e-3)
 
 
-@pytest.mark.parametrize("elements", [10, pytest.param(10_000, marks=pytest.mark.slow), 300])
+@pytest.mark.parametrize("elements", [10, pytest.param(10_000, marks=pytest.mark.slow), 100])
 def test_few_and_many_elements(elements):
     result = fm.equilibrium(plate(elements=elements), volume=AT_03[1])
     assert result.pressure == pytest.approx(AT_03[0], abs=2.0 / elements**4 + 5e-9)
@@ -329,6 +329,11 @@ def test_few_and_many_elements(elements):
 def test_a_membrane_deflated_away_from_a_plate_does_not_feel_it():
     bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(16)), volume=-1.0)
     assert fm.equilibrium(plate(elements=16), volume=-1.0).pressure == pytest.approx(bare.pressure, rel=1e-9)
+
+
+def test_no_pole_is_inside_a_body():
+    with pytest.raises(fm.SolveError, match="inside a body"):
+        fm.equilibrium(plate(elements=8), center_height=0.6)
 
 
 def test_between_two_plates():
@@ -344,3 +349,16 @@ def test_correct_takes_a_guess_on_a_mesh_that_follows_a_border():
     eq = fm.equilibrium(plate(elements=16), volume=1.1)
     result = correct(eq.potential, VolumeControl(1.1), eq.state, eq.pressure)
     assert result.pressure == pytest.approx(eq.pressure, rel=1e-12)
+
+
+def test_a_verdict_at_the_touch_says_both_bounds():
+    """Held by no force: between the eigenvalues with the pole free and with the pole held."""
+    branch = fm.trace(plate(elements=16), start=0.6, until={"volume": 1.0})
+    touch = next(p for p in branch.special_points if p.kind == "touch").equilibrium
+    bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(16)), volume=touch.volume)
+    verdict = touch.verdict("pressure")
+    assert verdict.stable
+    assert verdict.smallest_eigenvalue == pytest.approx(bare.verdict("pressure").smallest_eigenvalue, rel=1e-6)
+    if touch.contact.touching:
+        assert "between" in verdict.reason
+    assert "between" not in branch[-1].verdict("pressure").reason

@@ -234,6 +234,38 @@ def test_compression_is_told() -> None:
         pytest.fail("no state is compressed")
 
 
+def test_a_tube_bends_out_and_straightens_again() -> None:
+    # the branch of bent tubes leads from the first onset of n = 1 to the second one, and is stable at a held volume
+    asked = fm.Analysis(azimuthal_modes=(1,))
+    scene = fm.Scene(material=tipping().material, mesh=fm.cylinder(3.0, 8), degree=4, analysis=asked)
+    first, second = (p for p in fm.trace(scene, until={"volume": 160.0}).special_points or () if p.azimuthal)
+    bent = fm.trace(scene, start=first, special_points=False)
+    assert bent.status is Status.CLOSED
+    assert "the waves vanish" in bent.message
+    assert bent[-1].volume == pytest.approx(second.volume, abs=1.0)
+    middle = max(bent, key=lambda eq: eq.amplitude)
+    assert middle.amplitude > 0.4
+    assert middle.verdict("volume").stable is True
+    assert middle.energy < fm.equilibrium(scene, volume=middle.volume, start=first.equilibrium).energy
+
+
+def test_a_value_just_beyond_the_onset_is_met() -> None:
+    found = fm.trace(tipping(), start=onset(), until={"volume": 0.449})
+    assert [len(found), found.status] == [2, Status.CONVERGED]
+    assert found[-1].volume == pytest.approx(0.449, rel=1e-12)
+    assert found[-1].amplitude == pytest.approx(
+        onset().postbuckling.amplitude(0.449 - onset().volume) / np.sqrt(onset().equilibrium.potential.area), rel=0.05
+    )
+
+
+def test_a_scene_whose_mesh_was_chosen_goes_on_with_it() -> None:
+    scene = tipping().replace(mesh=fm.disc(accuracy=1e-4))
+    point = onset_of(scene, start=0.5, direction=-1, until={"center_height": 0.3})
+    found = fm.trace(scene, start=point, max_steps=1, special_points=False)
+    assert found.scene.mesh == point.equilibrium.scene.mesh
+    assert found[-1].volume > found[0].volume
+
+
 # --- what is asked
 
 
@@ -302,5 +334,5 @@ def test_what_is_asked_of_states_with_waves_in_a_wrong_way_is_refused() -> None:
     state = fm.trace(tipping(), start=onset(), max_steps=1)[1]
     with pytest.raises(fm.InputError, match="angles are allowed"):
         state.surface(10**15)
-    with pytest.raises(fm.InputError, match=r"which fm\.trace follows"):
+    with pytest.raises(fm.InputError, match=r"fm\.trace follows"):
         list(fm.trace_iter(tipping(), start=onset()))

@@ -526,6 +526,43 @@ def test_the_wrinkles_of_a_pushed_sphere() -> None:
         assert abs(int(np.argmin(above)) - 4) <= 2
 
 
+SHAPES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
+    "sphere": ({"mesh": fm.sphere(12)}, {"volume": 6.0}),
+    "torus": ({"mesh": fm.torus(aspect=3.0, elements=16)}, {"pressure": 0.5}),
+    "hub and mirror": ({"mesh": fm.cylinder(length=2.0, elements=12, top="hub", bottom="mirror")}, {"volume": 8.0}),
+    "free edge": ({"mesh": fm.annulus(0.3, 12, inner="free")}, {"volume": 0.5}),
+    "charge": ({"mesh": fm.disc(12), "electric": fm.Electric(total_charge=0.5)}, {"volume": 1.0}),
+    "self-field": (
+        {"mesh": fm.disc(12), "sources": [fm.Dipole(20.0, 2.5)], "susceptibility": 1.0, "demagnetization": True},
+        {"volume": 0.8},
+    ),
+    "uneven": ({"mesh": fm.disc(12), "thickness": "1 - 0.4*R**2"}, {"volume": 0.5}),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_shape_and_effect_bends(name: str) -> None:
+    """Bending raises every eigenvalue, by nearly nothing where the sheet is thin."""
+    arguments, load = SHAPES[name]
+    plain = fm.Scene(material=fm.NeoHookean(), degree=3, **arguments)
+    without = fm.equilibrium(plain, **load)
+    for ratio, most in ((1e4, 1e-3), (30.0, 0.5)):
+        eq = fm.equilibrium(plain.replace(bending=True, radius_to_thickness=ratio), **load)
+        for asked in ({"control": "pressure"}, {"azimuthal": 1}, {"azimuthal": 3}):
+            before, after = (state.verdict(**asked).smallest_eigenvalue for state in (without, eq))  # type: ignore[arg-type]
+            assert -1e-9 < after / before - 1 < most
+
+
+def test_a_sphere_bends_alike_in_all_directions() -> None:
+    """Harmonics of one degree have one eigenvalue, whatever their number of waves around the axis: 2 for the lowest, 3 for n = 3."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.sphere(16), degree=4, bending=True, radius_to_thickness=10.0)
+    eq = fm.equilibrium(scene, volume=6.0)
+    values = [eq.verdict("volume").smallest_eigenvalue, *(eq.verdict(azimuthal=n).smallest_eigenvalue for n in (1, 2))]
+    assert values == pytest.approx([values[0]] * 3, rel=1e-6)
+    plain = fm.equilibrium(scene.replace(bending=False), volume=6.0)
+    assert values[0] > 1.002 * plain.verdict("volume").smallest_eigenvalue
+
+
 def test_a_flat_membrane_at_rest_has_no_worst_number_of_waves() -> None:
     """Nothing is taut and nothing pushes: every eigenvalue is 0, and the search ends at once."""
     flat = fm.equilibrium(fm.Scene(fm.NeoHookean(), fm.disc(4), degree=2), volume=0.0)

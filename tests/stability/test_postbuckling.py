@@ -93,6 +93,16 @@ def test_fourth_derivatives_of_the_surface_are_those_of_the_axisymmetric_potenti
     assert float(fourth.sum()) == pytest.approx(curvature, rel=1e-3)
 
 
+def test_differences_of_second_derivatives_are_as_good_as_formulas() -> None:
+    from femmembrane.potential.surface import Expansions
+
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), sources=[fm.Dipole(60.0, -2.5)], susceptibility=1.5)
+    found = Expansions(potential_of(scene))
+    rho, eta = np.linspace(1e-4, 1.0, 20), np.linspace(0.5, 0.0, 20)
+    exact, near = found.position(rho, eta)[0], found._from_second_derivatives(rho, eta)
+    assert (np.abs(near - exact).max(axis=1) < 1e-9 * np.abs(exact).max(axis=1)).all()
+
+
 def test_tipping_over_beneath_a_strong_dipole_is_a_jump_at_a_held_volume(tipped: fm.SpecialPoint) -> None:
     # an independent three-dimensional membrane code finds the tipped states on the stable side of the onset, V > 0.4479
     assert (tipped.azimuthal, round(tipped.center_height, 3), round(tipped.volume, 4)) == (1, 0.312, 0.4479)
@@ -216,6 +226,21 @@ def test_tables_pages_and_pictures_say_it(tipped: fm.SpecialPoint, tmp_path: Any
     page = (tmp_path / "report.html").read_text()
     assert "azimuthal onset, n = 1, subcritical" in page
     assert "stable against small perturbations only" in page
+
+
+def test_a_branch_from_a_file_has_it_as_well(tmp_path: Any) -> None:
+    branch = fm.trace(tipping(), start=0.5, direction=-1, until={"center_height": 0.3})
+    branch.save(tmp_path / "branch.nc")
+    found, known = (next(p for p in b.special_points or () if p.azimuthal).postbuckling for b in (fm.load(tmp_path / "branch.nc"), branch))
+    assert found.coefficient == pytest.approx(known.coefficient, rel=1e-9)
+
+
+def test_an_onset_over_a_number_of_the_scene() -> None:
+    # let down at a held volume the dipole tips the membrane over: the same jump as along the volume
+    ways: dict[str, Any] = {"over": "source.0.height", "hold": {"volume": 0.47}, "until": {"source.0.height": -3.46}}
+    point = onset_of(tipping(), start=0.47, **ways)
+    assert point.number == pytest.approx(-3.48, abs=0.02)
+    assert point.postbuckling.kind == "subcritical"
 
 
 def test_nothing_is_built_until_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

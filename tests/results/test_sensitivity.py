@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 import femmembrane as fm
 from femmembrane.results.verdict import Verdict
-from femmembrane.scene.variation import Parameter, Scale, names
+from femmembrane.scene.variation import Parameter, Scale, names, parameter_of
 from femmembrane.solve.responses import Responses
 from femmembrane.stability.eigenvalue_rates import require_simple
 from femmembrane.stability.spectrum import Pencil
@@ -355,6 +355,37 @@ def test_in_si_units() -> None:
     found = eq.sensitivity(["pressure", "pressure_pa", "volume_m3"], "material.ratio", held="center_height")
     assert found["pressure_pa"] == pytest.approx(scales.to_si("pressure", found["pressure"]))
     assert found["volume_m3"] == pytest.approx(0.02**3 * eq.sensitivity("volume", "material.ratio", held="center_height"))
+
+
+def test_electric_quantities_in_si_units() -> None:
+    """Against solving again with another voltage, and on a sheet that is thicker or stiffer."""
+    scales, permittivity = fm.Scales(radius=0.02, thickness=1e-3, shear_modulus=3e4), 3.0
+    scene = fm.Scene(fm.MooneyRivlin(0.1), DISC, scales=scales, electric=fm.Electric(voltage=500.0, relative_permittivity=permittivity))
+    eq = solved(scene, {"volume": 1.0})
+    of = ["voltage_v", "charge_c", "capacitance_f", "electric_field_v_per_m"]
+    found = eq.sensitivity(of, ["electric.voltage", "scales.thickness", "scales.shear_modulus"], held="volume")
+
+    def answer(changed: fm.Scene) -> Any:
+        other = solved(changed, {"volume": 1.0}, eq)
+        converter = changed.converter
+        assert converter is not None
+        kinds = {"voltage": "voltage", "charge": "charge", "capacitance": "capacitance", "electric_field": "electric_field"}
+        return np.array([converter.to_si(kind, getattr(other, name)) for name, kind in kinds.items()])
+
+    here = answer(scene)
+    for name in ("electric.voltage", "scales.thickness", "scales.shear_modulus"):
+        parameter = parameter_of(scene, name)
+        h = 1e-3 * parameter.value
+        slopes = [
+            (answer(parameter.scene_at(parameter.value + t)) - answer(parameter.scene_at(parameter.value - t))) / (2 * t)
+            for t in (h, h / 2)
+        ]
+        true = (4 * slopes[1] - slopes[0]) / 3
+        for k, q in enumerate(of):
+            assert found[q][name] * parameter.value / here[k] == pytest.approx(true[k] * parameter.value / here[k], abs=1e-7)
+    without = solved(scene.replace(electric=fm.Electric(voltage=0.1)), {"volume": 1.0})
+    with pytest.raises(fm.InputError, match="did you mean 'voltage'"):
+        without.sensitivity("voltage_v", "electric.voltage")
 
 
 def test_what_has_no_derivative_is_refused() -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import SolveError, Status
 from .least_squares import Estimate, Problem
-from .statistics import Side, Spread, linear_intervals, quantile, spread_of
+from .statistics import Side, Spread, cut_by_bound, linear_intervals, quantile, spread_of
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,8 @@ def inside(problem: Problem, refit: Refit, truth: Array) -> NDArray[np.bool_]:
     """Which intervals by profile likelihood hold the truth, while the problem has the data of the fit; linearised ones of what has none."""
     half = quantile(0.95, problem.freedom, problem.has_unknown)
     found = (refit.intervals[:, 0] <= truth) & (truth <= refit.intervals[:, 1])
+    if cut_by_bound(problem.law, refit.intervals):
+        return found
     for k, value in enumerate(refit.estimate.point.values):
         if k not in refit.estimate.on_bound and not problem.law.has_edge(k) and value != truth[k]:
             side = Side(problem, refit.estimate, refit.spread, k, float(np.sign(truth[k] - value)), half)

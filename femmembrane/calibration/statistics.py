@@ -5,7 +5,8 @@ and normal errors; with deviations estimated from m - p residuals quantiles are 
 the set of values at which the least sum of squares over all other numbers exceeds the minimum by the square of that quantile: profile
 likelihood (Venzon and Moolgavkar 1988).
 
-A number on a bound has no smooth minimum there. Its intervals are those of the linear problem without the bound, cut at it.
+A number on a bound has no smooth minimum there. Intervals that a bound cuts are those of the linear problem without it, and all others
+are then linearised too.
 """
 
 from __future__ import annotations
@@ -111,7 +112,10 @@ def profile_intervals(
 
     The values at which the prediction breaks off, or beyond 12 standard errors, are infinite ends.
     """
-    found, followed = linear.copy(), []
+    followed: list[int] = []
+    found = linear.copy()
+    if cut_by_bound(problem.law, linear):
+        return found, followed
     for k in which:
         if k in estimate.on_bound or not np.isfinite(spread.errors[k]) or problem.law.has_edge(k):
             continue
@@ -124,6 +128,12 @@ def profile_intervals(
         found[k] = low, high
     problem.at(estimate.point.values)
     return found, followed
+
+
+def cut_by_bound(law: Law, linear: Array) -> bool:
+    """Whether a bound cuts an interval: the least sum of squares over all other numbers has kinks within them then."""
+    pairs = zip(law.coordinates, linear, strict=True)
+    return any(not c.logarithmic and (low <= c.low or high >= c.high) for c, (low, high) in pairs)
 
 
 class Side:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -71,7 +70,7 @@ def fit(
     with working(out, names), Interrupts() as interrupts:
         try:
             found = fitted(asked, tests, parameters, noise=deviations, units=units, starts=starts, intervals=intervals)
-            models = compare_models(asked, tests, noise=deviations, units=units) if compare else None
+            models = compare_models(asked, tests, noise=deviations, units=units, starts=starts or 3) if compare else None
         except SolveError as error:
             return fail(NOT_CONVERGED, explain(error.status, str(error)))
         interrupts.check()
@@ -86,11 +85,8 @@ def fit(
                 models.write_csv(out / "models.csv")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
-    if sys.stdout.isatty():
-        say(
-            "\n".join([str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)])
-            + "\n"
-        )
+    told = [str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)]
+    say("\n".join(told) + "\n")
     if found.status is not Status.CONVERGED:
         return fail(NOT_CONVERGED, f"{'; '.join(found.notes)}. What suits the data best so far is in {out}")
     return DONE

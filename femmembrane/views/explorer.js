@@ -123,7 +123,10 @@ function bodies() {
   return data.bodies.flatMap((body) => {
     const parts = body.rho.length === 1 && body.rho[0] === 0
       ? [{ type: "scatter3d", mode: "markers", x: [0], y: [0], z: body.z, marker: { color: "#b03060", size: 7 }, hoverinfo: "text", hovertext: body.label, showlegend: false }]
-      : body.rho.some((r) => r > 0) ? body.rho.map((r, k) => circle(r, body.z[k], red))
+      : body.rho.length > 1 && body.rho.some((r) => r > 0)
+        ? [{ type: "mesh3d", ...turned(body.rho, body.z, null, 0), ...triangles(body.rho.length), color: body.rigid ? "#8a8f94" : "#b03060",
+          opacity: 0.45, hoverinfo: "text", hovertext: body.label, showscale: false }]
+        : body.rho[0] > 0 ? [circle(body.rho[0], body.z[0], red)]
         : [{ type: "scatter3d", mode: "lines", x: body.rho.map(() => 0), y: body.rho.map(() => 0), z: body.z, hoverinfo: "text", hovertext: body.label, showlegend: false, ...red }];
     const middle = body.z.reduce((a, b) => a + b, 0) / body.z.length;
     if (body.moment) parts.push({ type: "cone", x: [0], y: [0], z: [middle + body.moment * size * 0.6], u: [0], v: [0], w: [body.moment],
@@ -184,8 +187,8 @@ function meridian(shape) {
   }
   for (const [r, z] of shape.hubs) traces.push(line([-r, r], [z, z], { line: { color: css("--soft"), width: 6 } }));
   for (const body of data.bodies) for (const side of body.rho.some((r) => r > 0) ? [1, -1] : [1])
-    traces.push(line(body.rho.map((r) => side * r), body.z, { mode: body.rho.length > 1 ? "lines" : "markers", name: body.label, showlegend: side > 0,
-      line: { color: "#b03060", width: 3 }, marker: { color: "#b03060", size: 9 } }));
+    traces.push(line(body.rho.map((r) => side * r), body.z, { mode: body.rho.length > 1 ? "lines" : "markers", name: body.label, showlegend: side > 0 && body.label !== "",
+      line: { color: body.rigid ? css("--soft") : "#b03060", width: 3 }, marker: { color: "#b03060", size: 9 } }));
   const unit = data.length ? ` in ${data.length}` : "", layout = frame(`radius ρ${unit || " / R₀"}`, `height η${unit || " / R₀"}`);
   const spare = 0.06 * extent(), heights = [data.box[1], data.box[2], ...data.bodies.flatMap((b) => b.z)];
   layout.yaxis = { ...layout.yaxis, scaleanchor: "x", range: [Math.min(...heights) - spare, Math.max(...heights) + spare] };

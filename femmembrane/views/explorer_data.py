@@ -267,7 +267,7 @@ def _room(shown: Sequence[Equilibrium], units: Units) -> dict[str, Any]:
     box = Box.of([equilibrium.profile() for equilibrium in shown])
     around, length = surroundings(shown[0].scene, box), units.factor("rho")
     bodies = [
-        {"label": body.label, "moment": body.moment, "rho": [_rounded(length * r, 6) for r, _ in body.points]}
+        {"label": body.label, "moment": body.moment, "rigid": body.rigid, "rho": [_rounded(length * r, 6) for r, _ in body.points]}
         | {"z": [_rounded(length * z, 6) for _, z in body.points]}
         for body in around.near
     ]

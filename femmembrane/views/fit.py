@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from html import escape
 from itertools import pairwise
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..files import replace_file
+from ..quantities import QUANTITIES, axis_label, words
 from ..results.fit import percent
 from .backend import title_text
 from .figures import save_figure, shown_figure
@@ -78,7 +80,7 @@ def _draw(axes: Axes, column: FittedColumn, several: bool) -> None:
     look: dict[str, Any] = {"fmt": "o", "color": "#222222", "markersize": 4, "elinewidth": 1.0, "zorder": 3}
     spread = column.held_deviation if column.held_deviation.any() else None
     axes.errorbar(column.held_measured, column.measured, yerr=column.deviation, xerr=spread, label="measured", **look)
-    axes.set_ylabel(column.header)
+    axes.set_ylabel(_named(column.quantity, column.header))
     if several:
         axes.set_title(column.test.rpartition("/")[2], fontsize=9)
     axes.grid(color="0.9", linewidth=0.6)
@@ -95,13 +97,21 @@ def _curve(x: np.ndarray, y: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray,
     return fine, CubicHermiteSpline(x, y, slope)(fine)
 
 
+def _named(quantity: str, header: str) -> str:
+    """Text at an axis for a column, in the unit that its header ends in: ``pole_height_mm`` is a pole height in mm."""
+    unit = re.fullmatch(r"[a-z_]+?_((?:[munµ]|[kM]|c|d|h)?(?:m[23]?|Pa|l|bar)|psi|mmHg)|[^(\[]*[(\[](.+)[)\]]\s*", header.strip())
+    if header == quantity or unit is None or quantity not in QUANTITIES:
+        return axis_label(quantity) if header == quantity else header
+    return f"{words(quantity)} in {unit[1] or unit[2]}"
+
+
 def _draw_residuals(axes: Axes, column: FittedColumn) -> None:
     axes.axhspan(-1.96, 1.96, color="0.93", zorder=0, linewidth=0)
     axes.axhline(0.0, color="0.4", linewidth=0.8, zorder=1)
     axes.plot(column.held, -column.residual, "o", color=_RED, markersize=4, zorder=2)
     top = max(3.0, 1.1 * float(np.abs(column.residual).max(initial=0.0)))
     axes.set_ylim(-top, top)
-    axes.set_xlabel(column.against_header)
+    axes.set_xlabel(_named(column.against, column.against_header))
     axes.set_ylabel("residual/sd")
     axes.spines[["top", "right"]].set_visible(False)
 

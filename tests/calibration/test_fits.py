@@ -450,12 +450,12 @@ def test_obstacles_are_refused():
 
 
 def test_data_sets_that_are_drawn():
-    """Their numbers scatter by the standard errors, which 200 of them know to 10 % at twice their own."""
-    found = fm.fit(scene(fm.NeoHookean()), gent_data(), ["material.mu"], noise="1 %", samples=200)
+    """Their numbers scatter by the standard errors, which 60 of them know to 27 % at three times their own."""
+    found = fm.fit(scene(fm.NeoHookean()), gent_data(), ["material.mu"], noise="1 %", samples=60)
     drawn = found.samples["material.mu"]
-    assert drawn.shape == (200,)
-    assert drawn.std() == pytest.approx(found.standard_errors["material.mu"], rel=0.15)
-    assert drawn.mean() == pytest.approx(found.values["material.mu"], abs=4 * found.standard_errors["material.mu"] / np.sqrt(200))
+    assert drawn.shape == (60,)
+    assert drawn.std() == pytest.approx(found.standard_errors["material.mu"], rel=0.3)
+    assert drawn.mean() == pytest.approx(found.values["material.mu"], abs=4 * found.standard_errors["material.mu"] / np.sqrt(60))
 
 
 def test_exact_log_likelihood():

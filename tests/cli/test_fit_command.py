@@ -21,7 +21,7 @@ def command(out: Path, *more: str, data: str = "", parameters: tuple[str, ...] =
     return main([*words, "--set", "mesh.elements=8", "--set", "mesh.degree=4", *more])
 
 
-def test_the_demo_of_a_bulge_test(tmp_path, silent):
+def test_the_demo_of_a_bulge_test(tmp_path):
     """The moduli that the synthetic table was made with lie in their intervals; the scene that is left holds them."""
     assert command(tmp_path / "out", "--noise", "pressure=1 %", "center_height=0.1 mm") == DONE
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
@@ -40,14 +40,14 @@ def test_the_demo_of_a_bulge_test(tmp_path, silent):
         assert len(list(csv.DictReader(file))) == 16
 
 
-def test_models_and_a_test_of_another_scene(tmp_path, silent):
+def test_models_and_a_test_of_another_scene(tmp_path):
     strip = tmp_path / "strip.csv"
     mu = 344e3
     strip.write_text(
         "stretch,uniaxial_stress_MPa\n" + "".join(f"{s},{mu * (s - s**-2) / 1e6}\n" for s in (1.2, 1.6, 2.2, 3.0)), encoding="utf-8"
     )
     other = f"{DEMOS / 'bulge-test.toml'}={strip}"
-    assert command(tmp_path / "out", other, "--noise", "1 %", "--compare", parameters=("scales.shear_modulus",)) == DONE
+    assert command(tmp_path / "out", other, "--noise", "1 %", "--compare", "--starts", "1", parameters=("scales.shear_modulus",)) == DONE
     assert {path.name for path in (tmp_path / "out").iterdir()} == {*FILES, "models.csv"}
     with (tmp_path / "out" / "models.csv").open(encoding="utf-8", newline="") as file:
         assert {row["model"] for row in csv.DictReader(file)} >= {"neo-hookean", "gent", "ogden-3"}

@@ -331,6 +331,11 @@ def test_a_membrane_deflated_away_from_a_plate_does_not_feel_it():
     assert fm.equilibrium(plate(elements=16), volume=-1.0).pressure == pytest.approx(bare.pressure, rel=1e-9)
 
 
+def test_no_pole_is_inside_a_body():
+    with pytest.raises(fm.SolveError, match="inside a body"):
+        fm.equilibrium(plate(elements=8), center_height=0.6)
+
+
 def test_between_two_plates():
     """A sphere between two plates is flattened on both sides alike, with opposite forces."""
     plates = [fm.Plane(1.2), fm.Plane(-1.2, side="above")]

@@ -289,6 +289,14 @@ def test_electric_quantities(electric: fm.Electric) -> None:
     along_numbers(scene, names(scene), answer, {name: np.array([found[q][name] for q in of]) for name in names(scene)})
 
 
+def test_what_a_run_over_a_number_holds_is_held() -> None:
+    scene = fm.Scene(fm.MooneyRivlin(0.1), DISC, sources=[fm.Dipole(20.0, 4.0)], susceptibility=1.0)
+    branch = fm.vary(scene, "source.0.height", [4.0, 4.2], hold={"pressure": 0.8})
+    held = branch.sensitivity("volume", "source.0.height", held="pressure")
+    assert (branch.sensitivity("volume", "source.0.height") == held).all()
+    assert abs(held).min() > 1e-3
+
+
 def test_electrodes_without_a_voltage() -> None:
     """Q = C(V) phi, where C does not change with the sign of phi."""
     eq = solved(fm.Scene(fm.MooneyRivlin(0.1), DISC, electric=fm.Electric(voltage=0.0)), {"volume": 1.0})

@@ -10,7 +10,7 @@ import femmembrane as fm
 BODIES = {
     "plane": fm.Plane(0.5),
     "ball": fm.Ball(height=1.0, radius=0.3),
-    "cylinder": fm.CylinderObstacle(height=1.0, radius=0.5, length=0.4, rounding=0.05),
+    "cylinder": fm.Cylinder(height=1.0, radius=0.5, length=0.4, rounding=0.05),
     "bottle": fm.Mould([(0.0, -1.0), (1.0, -1.0), (1.0, 1.0)], rounding=0.2, side="left"),
     "edge": fm.Mould([(0.0, 1.0), (1.0, 0.0), (2.0, 1.0)], side="right"),
 }

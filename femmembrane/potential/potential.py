@@ -581,7 +581,7 @@ def _plain(scene: Scene) -> Scene:
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
     plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
-    return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
+    return scene.replace(title="", follow_zones=False, run=None, analysis=type(scene.analysis)(), **plain)
 
 
 def require_elements(scene: Scene) -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.meridian import on_own_ends
 from ..errors import Status
 from ..quantities import typed
 from ..scene.variation import Parameter
@@ -91,7 +92,7 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
         states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
         for k, own in enumerate(ends):
             if not np.array_equal(own, scene.mesh.breakpoints()):
-                on_branch[k], scenes[k] = states_there[k], scenes[k].replace(mesh=scenes[k].mesh.on_ends(own))
+                on_branch[k], scenes[k] = states_there[k], scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, own))
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},

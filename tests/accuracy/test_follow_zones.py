@@ -119,3 +119,13 @@ def test_surfaces_have_the_nodes_of_their_own_elements(tmp_path: Path):
     assert set(eq.zones("mechanical").borders) <= set(eq.profile()["r"])
     inflated().to_vtk(tmp_path / "surfaces.pvd")
     assert len(list(tmp_path.rglob("*.vt*"))) >= len(inflated())
+
+
+def test_an_accuracy_is_kept_with_high_degrees():
+    """Few elements for ten digits; with borders inside elements 1e-8 took hundreds."""
+    scene = following().replace(mesh=fm.disc(accuracy=1e-9))
+    eq = fm.equilibrium(scene, volume=DISC[-0.1].volume)
+    assert eq.pressure == pytest.approx(DISC[-0.1].pressure, rel=1e-9)
+    assert eq.scene.degree > 4
+    assert eq.scene.mesh.elements < 24
+    assert eq.scene.mesh.accuracy == 1e-9

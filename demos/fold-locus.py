@@ -39,7 +39,7 @@ def magnetic_limit_point(strength: float) -> fm.SpecialPoint:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("."), help="folder for fold-locus.png")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)

@@ -68,13 +68,8 @@ def draw(found: dict[str, list[tuple[float, fm.Branch, fm.SpecialPoint]]], path:
             plots.draw_branch(axes, branch, across=over, up="center_height", dots=False)
             first = (branch[0].number(over), branch[0].center_height)
             inward = -1 if over.endswith("height") else 1
-            look = {
-                "xytext": (2 * inward, 4 if inward < 0 else 9),
-                "textcoords": "offset points",
-                "fontsize": 9,
-                "ha": "right" if inward < 0 else "left",
-            }
-            axes.annotate(f"P = {pressure:g}", first, **look)
+            plots.add_label(axes, f"P = {pressure:g}", first, way=(-inward, 0))
+        axes.margins(x=0.17)  # room for the labels before the lines
     plots.draw_legend(row[0], loc="upper right")
     plots.save_figure(figure, path)
 

@@ -1,5 +1,6 @@
 """The public names: where each is defined. This list is the only one; ``__init__.py`` reads it."""
 
+from .calibration.measured import LabTest as LabTest
 from .discretization.curve import Curve as Curve
 from .discretization.curve import meridian_from_points as meridian_from_points
 from .discretization.meridian import Disc as Disc
@@ -48,6 +49,11 @@ from .physics.mixture import maxwell_garnett as maxwell_garnett
 from .physics.named import MaterialData as MaterialData
 from .physics.named import material as material
 from .physics.named import material_data as material_data
+from .physics.obstacles import Ball as Ball
+from .physics.obstacles import CylinderObstacle as CylinderObstacle
+from .physics.obstacles import Mould as Mould
+from .physics.obstacles import Obstacle as Obstacle
+from .physics.obstacles import Plane as Plane
 from .physics.scales import Scales as Scales
 from .physics.sources import Loop as Loop
 from .physics.sources import Solenoid as Solenoid
@@ -64,12 +70,18 @@ from .results.equilibrium import Equilibrium as Equilibrium
 from .results.error_estimate import Deviation as Deviation
 from .results.error_estimate import ErrorEstimate as ErrorEstimate
 from .results.error_estimate import PlaceEstimate as PlaceEstimate
+from .results.fit import Comparison as Comparison
+from .results.fit import Fit as Fit
+from .results.fit import Plan as Plan
 from .results.folds import Cusp as Cusp
 from .results.folds import FoldCurve as FoldCurve
+from .results.postbuckling import Postbuckling as Postbuckling
 from .results.special_point import Jump as Jump
 from .results.special_point import SpecialPoint as SpecialPoint
 from .results.store import load as load
 from .results.sweep import Sweep as Sweep
+from .results.tipped import TippedBranch as TippedBranch
+from .results.tipped import TippedEquilibrium as TippedEquilibrium
 from .results.verdict import Verdict as Verdict
 from .results.vibration import Vibration as Vibration
 from .results.zones import Zone as Zone
@@ -92,6 +104,9 @@ from .verbs import trace_iter as trace_iter
 from .verbs import vary as vary
 from .verbs.convergence import convergence as convergence
 from .verbs.cost import cost as cost
+from .verbs.fit import compare_models as compare_models
+from .verbs.fit import fit as fit
+from .verbs.fit import plan_fit as plan_fit
 from .verbs.sweep import plan_sweep as plan_sweep
 from .verbs.sweep import sweep as sweep
 from .verbs.trace import trace as trace

@@ -183,6 +183,15 @@ QUANTITIES: Mapping[str, Quantity] = {
         "capacitance over eps R0^2/T", symbol="C", words="capacitance", label="capacitance CT/(εR₀²)", si="capacitance"
     ),
     "capacitance_f": Quantity("capacitance", "F", symbol="capacitance in F", words="capacitance"),
+    "contact_radius": Quantity("largest deformed radius of contact over R0"),
+    "contact_reference_radius": Quantity("reference radius of the border of contact over R0"),
+    "contact_force": Quantity("axial force on bodies over mu T R0, positive upwards"),
+    "contact_area": Quantity("deformed area in contact over R0^2"),
+    "least_gap": Quantity("least gap between a node and a body over R0"),
+    "border_end": Quantity("number of the end of elements at a border of contact, -1 for none", type=int),
+    "border_place": Quantity("place of a border of contact along the reference meridian"),
+    "gap": Quantity("gap between membrane and nearest body over R0"),
+    "contact_pressure": Quantity("pressure between membrane and body over mu T/R0"),
     "electric_field": Quantity(
         "true electric field over sqrt(mu/eps), of an equilibrium the largest", label="electric field E√(ε/μ)", si="electric_field"
     ),
@@ -218,7 +227,14 @@ QUANTITIES: Mapping[str, Quantity] = {
     "kind": Quantity("kind of the special point", type=str),
     "error": Quantity("uncertainty of the special point's location"),
     "tangent": Quantity("direction of the branch on which it was found, in the unknowns and the pressure"),
+    "waves_all": Quantity("number of waves around the axis with the lowest eigenvalue", words="worst number of waves", type=int),
     "azimuthal": Quantity("number of waves around the axis of the instability that sets in", type=int),
+    "amplitude": Quantity("root mean square of the part of the displacement that has waves around the axis, over R0"),
+    "shift": Quantity("displacement of the pole across the axis, over R0"),
+    "harmonics": Quantity("number of harmonics around the axis beside the constant one", type=int),
+    "truncation": Quantity("estimated root mean square of the harmonics left out, over R0"),
+    "postbuckling": Quantity("whether it sets in gradually (supercritical) or with a jump (subcritical) at a held volume", type=str),
+    "postbuckling_coefficient": Quantity("its coefficient b of Koiter at a held volume, over mu T R0^2", words="coefficient b"),
     "trace_border": Quantity("softest displacement at the last point of a trace over a number"),
     "trace_sigma": Quantity("arc length, or load, at the last points of the path"),
     "trace_point": Quantity("state and pressure at the last points of the path"),
@@ -232,7 +248,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "fraction_double": Quantity("part of the reference area with wrinkles both ways (s11 < 0 and s22 < 0)"),
     "error_pressure": Quantity("estimated error of the pressure, relative"),
     "error_volume": Quantity("estimated error of the volume, relative"),
-    "error_energy": Quantity("estimated error of elastic plus magnetic energy, over the sum of their sizes"),
+    "error_energy": Quantity("estimated error of the total energy, over the sum of the sizes of its parts"),
     "estimated": Quantity("quantity whose error is estimated"),
     "error_value": Quantity("quantity at the equilibrium whose error is estimated"),
     "error_estimate": Quantity("its estimated error, signed"),
@@ -313,6 +329,7 @@ _OF_VERDICTS: Mapping[str, Quantity] = {
     "verdict": Quantity("stability", type=str),
     "negative_directions": Quantity("number of negative eigenvalues (-1: not counted)", type=int),
     "reason": Quantity("reason of the verdict", type=str),
+    "wavelength": Quantity("length of a wave around the axis where the mode is largest, over R0"),
     "mode": Quantity("shape of the smallest eigenvalue's mode (none: NaN)"),
 }
 #: what follows the name of a quantity of each kind where it is given in SI units
@@ -365,6 +382,8 @@ def _of_verdict(name: str) -> Quantity | None:
         return _OF_VERDICTS.get(name)
     tag, _, part = name.removeprefix(kind + "_").partition("_")
     waves, known = tag[1:].isdigit(), _OF_VERDICTS[kind]
+    if tag == "all":
+        return Quantity(f"{known.meaning}, the worst number of waves", label="λ, worst n" if kind == "lambda" else "", type=known.type)
     against = f"azimuthal mode n = {tag[1:]}" if waves else f"axisymmetric shapes under {tag} control"
     return Quantity(
         f"{known.meaning}, {against}" + (f": {part}" if part else ""),

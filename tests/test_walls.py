@@ -29,6 +29,7 @@ ROOMS = (
     ("results",),
     ("stability",),
     ("accuracy",),
+    ("calibration",),
     ("views",),
     ("verbs",),
     ("cli", "__main__"),

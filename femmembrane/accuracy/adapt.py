@@ -76,7 +76,7 @@ def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
 
     Errors are compared at the same volume, and in a run by heights at the same pole height. With arc length the smaller of both counts,
     since it is regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run,
-    and over the sum of the sizes of elastic and magnetic energy. States without an estimate (compressed, slack) do not count.
+    and over the sum of the sizes of all energies. States without an estimate (compressed, slack) do not count.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ class _Trial:
         # a run over a number of the scene has a scene for every state
         here = eq.scene.replace(mesh=scene.mesh, degree=scene.degree)
         potential = potential_of(here)
-        for kind in (CONTROLS[name] for name in reversed(self.controls)):
+        for kind in (CONTROLS[name] for name in reversed(_can_hold(self.controls, potential))):
             held = kind.at(kind.value(eq.potential.space, eq.state, eq.pressure, eq.volume))
             result = solved_in(potential, held, eq.potential, eq.state, eq.pressure, damped=True)
             if result.status is Status.CONVERGED:
@@ -354,7 +354,7 @@ def relative_error(potential: Potential, x: Array, pressure: float, controls: Se
         return np.nan
     finer = potential_of(finer_space(potential, evaluation, pressure)[0])
     errors = []
-    for control in controls:
+    for control in _can_hold(controls, potential):
         better = same_state(finer, potential, x, pressure, evaluation, control)[0]
         if better is not None:
             errors.append(yardstick.worst(_errors(potential, x, pressure, evaluation, finer, better, yardstick)))
@@ -367,7 +367,7 @@ def _errors(
     """Relative errors of what is asked."""
     errors = {}
     if "pressure" in yardstick.asked:
-        sizes = max(abs(pressure), yardstick.pressure), abs(evaluation.elastic_energy) + abs(evaluation.magnetic_energy)
+        sizes = max(abs(pressure), yardstick.pressure), evaluation.energy_size
         changes = abs(pressure - better.pressure), abs(evaluation.energy - better.evaluation.energy)
         errors["pressure"] = max(c / size if size else 0.0 for c, size in zip(changes, sizes, strict=True))
     if "profile" in yardstick.asked:
@@ -410,6 +410,11 @@ def _trial(scene: Scene, follow: Follow, control: str) -> _Trial:
 def _controls(control: str) -> tuple[str, ...]:
     """What is held while errors are estimated, for a kind of run."""
     return {"center_height": ("center_height",), "arc-length": ("volume", "center_height")}.get(control, ("volume",))
+
+
+def _can_hold(controls: Sequence[str], potential: Potential) -> tuple[str, ...]:
+    """Those that can be held: no control moves a first end that is held along the axis."""
+    return tuple(name for name in controls if name != "center_height" or potential.space.pole < potential.space.n_free)
 
 
 def _on(scene: Scene, mesh: Meridian) -> Scene:

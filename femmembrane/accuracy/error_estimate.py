@@ -65,7 +65,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     if found is None:
         return _without(control, values, method, reason)
     better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
-    errors = _errors(control, values, _numbers(finer, found.x, found.pressure, found.evaluation, better))
+    errors = _errors(control, values, _numbers(finer, found.evaluation.x, found.pressure, found.evaluation, better))
     if potential.scene.degree == _RECOVERED and finer.scene.degree == _RECOVERED + 1:
         errors |= _stress_errors(values, finer, found, control)
     errors["displacement"] = finer.space.unit * distance(finer, found.x, transferred(potential.space, x, finer.space))
@@ -79,6 +79,8 @@ def _numbers(potential: Potential, x: Array, pressure: float, evaluation: Evalua
         "center_height": potential.space.center_height(x),
         "elastic_energy": evaluation.elastic_energy,
         "magnetic_energy": evaluation.magnetic_energy,
+        "load_energy": evaluation.load_energy,
+        "electric_energy": evaluation.electric_energy,
         "energy": evaluation.energy,
         "lambda_pressure": float(verdicts["pressure"].smallest_eigenvalue),
         "lambda_volume": float(verdicts["volume"].smallest_eigenvalue),

@@ -73,6 +73,8 @@ class StrongForm:
         if scene.tension_field:
             allowed = "false is allowed: shooting and collocation solve the equations of a plain membrane"
             raise InputError("effects.tension_field", True, allowed)
+        if scene.bodies:
+            raise InputError("obstacle", scene.bodies[0].label(), "none is allowed here: the equations are those of a free membrane")
         self.scene = scene
         self.legs = legs_of(scene.mesh)
         sheet = Sheet.of(scene)

@@ -2,8 +2,8 @@
 
 Exit codes: 0 done, 2 bad input (nothing was computed), 3 not converged (what was computed is written), 4 results could not be written (a
 full disk, too little memory), 130 interrupted (what was computed is written, and ``run --resume`` goes on).
-In a pipe nothing is printed but errors, one line each on stderr. There is one module a command. Slow imports stand inside its functions, so
-that ``--help`` answers at once.
+What was written is said on stdout, also in a pipe; errors are one line each on stderr. There is one module a command. Slow imports stand
+inside its functions, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import InputError
-from . import completion, convergence, cost, export, report, run, scenes, sweep, view
+from . import completion, convergence, cost, explore, export, fit, report, run, scenes, sweep, view
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, drop, fail, no_room, open_streams
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
@@ -36,7 +36,9 @@ for command in (
     sweep.sweep,
     convergence.convergence,
     cost.cost,
+    fit.fit,
     report.report,
+    explore.explore,
     view.view,
     export.export,
     scenes.scenes,

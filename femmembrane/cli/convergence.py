@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
@@ -49,8 +48,7 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if study.messages:
         return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
-    if sys.stdout.isatty():
-        say("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
+    say("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
     return DONE
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from ..errors import InputError, SolveError
@@ -42,6 +41,5 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
             study.plot(out / "cost.png")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
-    if sys.stdout.isatty():
-        say(f"{study}\n")
+    say(f"{study}\n")
     return DONE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from ..errors import InputError
@@ -35,6 +34,5 @@ def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | Non
         raise InputError("--out", str(out), f"a name that ends in {suffix} is allowed")
     file = out or (folder if folder.is_dir() else folder.parent) / f"export{suffix}"
     files = write(finished(folder), file, step=step)
-    if sys.stdout.isatty():
-        say(f"written:\n  {files[-1]}\n")
+    say(f"written:\n  {files[-1]}\n")
     return DONE

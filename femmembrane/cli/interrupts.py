@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -38,3 +40,5 @@ class Interrupts:
         first, self.caught = not self.caught, True
         if not (first and self.hold):
             raise KeyboardInterrupt
+        with suppress(OSError):  # of the system alone: a handler may run in the middle of a write
+            os.write(2, b"femmembrane: interrupted; what is being computed or written is finished first; Ctrl-C again drops it\n")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Protocol, Self
 
 if TYPE_CHECKING:
@@ -56,6 +57,21 @@ class _Bar:
 def observer(scene: Scene) -> AbstractContextManager[_Observer]:
     """The observer of a run: a line on a terminal, none in a pipe."""
     return _Bar(scene) if sys.stderr.isatty() else nullcontext(_Quiet())
+
+
+@contextmanager
+def counter(things: str) -> Iterator[Callable[[int, int], None]]:
+    """Who counts things as they come: a bar on a terminal from the first one on, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda number, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(bar_width=20), MofNCompleteColumn(), TextColumn(things), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=None, visible=False)
+        yield lambda number, total: progress.update(task, completed=number, total=total, visible=True)
 
 
 def _way(scene: Scene, equilibrium: Equilibrium) -> str:

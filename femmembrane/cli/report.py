@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +28,7 @@ def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled"
         Of figures and ranges: those of the package, or SI units by the [scales] of the scene.
     """
     page = write(folder, out, units)
-    if sys.stdout.isatty():
-        say(f"written:\n  {page}\n")
+    say(f"written:\n  {page}\n")
     return DONE
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -10,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, SolveError, Status
+from .explore import check_explorer
+from .explore import write as write_explorer
 from .folders import Changes, System, finished, read, units_of, working
 from .interrupts import Interrupts
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
@@ -24,7 +25,15 @@ if TYPE_CHECKING:
 
 
 def run(
-    scene: Path, /, *, out: Path, changes: Changes = None, resume: bool = False, report: bool = False, units: System | None = None
+    scene: Path,
+    /,
+    *,
+    out: Path,
+    changes: Changes = None,
+    resume: bool = False,
+    report: bool = False,
+    explore: bool = False,
+    units: System | None = None,
 ) -> int:
     """Compute the equilibria that a scene file asks for and write them to a folder.
 
@@ -44,8 +53,10 @@ def run(
         Go on where a run of the same scene in this folder was interrupted; without one, start.
     report
         Write report.html as well, one page about the run.
+    explore
+        Write explore.html as well, a page on which the branch is explored.
     units
-        Of pictures and the report: those of the package, or SI units by the [scales] of the scene; those of the scene file unless given.
+        Of pictures and pages: those of the package, or SI units by the [scales] of the scene; those of the scene file unless given.
     """
     asked = read(scene, changes)
     from ..quantities import Units
@@ -55,6 +66,8 @@ def run(
 
     system = units_of(scene, changes, units)
     Units.of(system, asked.converter)
+    if explore:
+        check_explorer()
     for remark in remarks_on_loads(asked):
         fail(DONE, remark)
 
@@ -78,6 +91,11 @@ def run(
             written = _write(branch, out, scene, changes or (), system)
             if report:
                 written.append(write_report(out, units=system))
+            if explore and len(branch):
+                written.append(write_explorer(out, units=system))
+        except KeyboardInterrupt:  # the second one
+            checkpoints.save()
+            return fail(INTERRUPTED, f"interrupted while results were written to {out}: some are missing; --resume writes them")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, _kept(error, checkpoints, out))
         if code != INTERRUPTED:
@@ -87,8 +105,7 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    if sys.stdout.isatty():
-        say(_summary(branch, written))
+    say(_summary(branch, written))
     return DONE
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 from ..errors import InputError
@@ -44,6 +43,7 @@ degree = 2
 
 # [effects]
 # tension_field = true                 # wrinkles in place of compression
+# bending = true                       # verdicts with bending stiffness: how many wrinkles; needs membrane.radius_to_thickness
 
 [run]
 control = "volume"                     # or "pressure", "height"; "arc-length" takes start (a volume) and until
@@ -53,7 +53,7 @@ steps = 40
 
 [analysis]
 stability = ["pressure", "volume"]     # under which controls
-# azimuthal_modes = [1, 2]             # waves around the axis
+# azimuthal_modes = [1, 2]             # waves around the axis; "all" for the worst number
 # wrinkling = "total"                  # zones by the total or the "mechanical" stresses
 # error_estimates = true
 """
@@ -89,8 +89,7 @@ def new(name: str, /) -> int:
     except (OSError, ValueError) as error:
         reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
         raise InputError("name", name, f"{path} cannot be written ({reason})") from None
-    if sys.stdout.isatty():
-        say(f"written: {path}\nNext: femmembrane run {path} --out out\n")
+    say(f"written: {path}\nNext: femmembrane run {path} --out out\n")
     return DONE
 
 

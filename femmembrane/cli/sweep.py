@@ -125,8 +125,7 @@ def sweep(
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if not results:
         return fail(NOT_CONVERGED, f"no scene has a result; the reasons are in {written[0]}")
-    if sys.stdout.isatty():
-        say("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
+    say("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
     return DONE
 
 

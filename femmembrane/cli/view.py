@@ -42,11 +42,13 @@ def view(
     """
     from ..files import remove_leftovers
     from ..views.viewer import view as show
+    from .progress import counter
 
     for file in filter(None, (screenshot, movie)):
         remove_leftovers(file.parent)
     try:
-        show(finished(folder), color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units)
+        with counter("frames") as count:
+            show(finished(folder), color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units, on_frame=count)
     except SolveError as error:
         return fail(NOT_CONVERGED, explain(error.status, str(error)))
     return DONE

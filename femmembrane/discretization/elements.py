@@ -58,6 +58,14 @@ def _tabulated(degree: int, xi: Array) -> tuple[Array, Array]:
     return value, slope
 
 
+def second_derivatives(degree: int, xi: Array) -> Array:
+    """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
+    points = lobatto(degree)
+    slope = shape_functions(degree, points)[1]
+    series = np.linalg.solve(np.polynomial.legendre.legvander(2 * points - 1, degree), slope)  # of the slopes in Legendre polynomials
+    return np.asarray(np.polynomial.legendre.legval(2 * np.asarray(xi) - 1, 2 * np.polynomial.legendre.legder(series)).T)
+
+
 def lobatto(degree: int) -> Array:
     """Chebyshev-Lobatto points on [0, 1], ends included."""
     return (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2

@@ -119,15 +119,12 @@ class Numbering:
         local, n_nodes = meridian_order(line, element)
         points, weights = _at_ends() if quadrature == 0 else _quadrature(degree, quadrature or 2 * degree + 1)
         self.n_elements, self.n_quadrature = line.nelements, points.shape[1]
-        mapping = line.mapping()
-        self.s: Array = np.ascontiguousarray(mapping.F(points)[0].T)
-        self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
-        self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.points: Array = points[0]
+        self._quadrature: Array = weights
         self.lift = lift_of(mesh, prestretch)
         self.strained = self.lift is not None and not self.lift.rigid
+        self._place(self.ends, line)
         self.radial = bool((self.s == self.R).all())
-        self.lengths: Array = weights @ np.hypot(self.R_x, self.Z_x)
-        self.weights: Array = np.repeat(2 * np.pi * weights[:, None], self.n_elements, axis=1)
 
         span = float(self.lengths.sum()) / (1 if mesh.supports() else 2 * np.pi)
         self._support(n_nodes)
@@ -137,7 +134,16 @@ class Numbering:
             self.unit = max(self.unit, min(float(self._lifted_ends[0].max()), drawn))
         self.slenderness = max(1.0, extent(*self._lifted_ends) / self.unit)
         self._number(self.nodes[local])
-        self.points: Array = points[0]
+
+    def _place(self, ends: Array, line: skfem.MeshLine | None = None) -> None:
+        """Put the ends of elements at places along the meridian."""
+        mesh, self.ends, self.sizes = self.mesh, ends, np.diff(ends)
+        mapping = (line or skfem.MeshLine(ends)).mapping()
+        self.s: Array = np.ascontiguousarray(mapping.F(self.points[None])[0].T)
+        self.R, self.Z = (np.ascontiguousarray(c) for c in mesh.position(self.s))
+        self.R_x, self.Z_x = (np.ascontiguousarray(c * self.sizes) for c in mesh.tangent(self.s))
+        self.lengths: Array = self._quadrature @ np.hypot(self.R_x, self.Z_x)
+        self.weights: Array = np.repeat(2 * np.pi * self._quadrature[:, None], self.n_elements, axis=1)
 
     def _support(self, n_nodes: int) -> None:
         """Find what holds the ends, what closes the volume there, and how rigid motions are kept out."""

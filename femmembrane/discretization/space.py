@@ -9,6 +9,7 @@ evaluating and assembling are one matrix product each.
 
 from __future__ import annotations
 
+import copy
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any, cast
@@ -19,7 +20,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, shape_functions
+from .elements import lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -40,6 +41,8 @@ class Space(Numbering):
 
     Attributes
     ----------
+    nodal : bool
+        Whether all coefficients are values at :meth:`.Numbering.interpolation_points`, for degrees from 3 on too.
     table : ndarray, shape (4 n_quadrature, 2 (degree + 1))
         (u, u_x, w, w_x) at the quadrature points of an element from its coefficients.
     reach : float
@@ -56,8 +59,10 @@ class Space(Numbering):
         anchored: frozenset[str] = frozenset(),
         ends: tuple[float, ...] = (),
         prestretch: float = 1.0,
+        nodal: bool = False,
     ) -> None:
         super().__init__(mesh, degree, quadrature, anchored, ends, prestretch)
+        self.nodal = nodal and degree > 2  # up to degree 2 the coefficients are values at the nodes anyway
         self._tabulate()
 
     def _tabulate(self) -> None:
@@ -85,9 +90,35 @@ class Space(Numbering):
         self._known_ends: dict[int, tuple[int, int, float, float]] = {}
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
+    def with_moved(self, places: tuple[tuple[int, float], ...]) -> Space:
+        """The same space with some ends of elements at other places along the meridian: the numbering stays.
+
+        Parameters
+        ----------
+        places : tuple of (int, float)
+            Numbers of ends and their places.
+        """
+        moved: Space = copy.copy(self)
+        for name in [name for name in vars(moved) if isinstance(getattr(type(moved), name, None), cached_property)]:
+            del moved.__dict__[name]
+        ends = self.ends.copy()
+        for k, s in places:
+            ends[k] = s
+        moved._place(ends)
+        moved._known_ends = {}
+        return moved
+
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
-        return shape_functions(self.degree, xi)
+        value, slope = shape_functions(self.degree, xi)
+        if not self.nodal:
+            return value, slope
+        at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
+        return value @ at_nodes, slope @ at_nodes
+
+    def second_derivatives(self, xi: Array) -> Array:
+        """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
+        return second_derivatives(self.degree, xi)
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
@@ -362,15 +393,37 @@ class Space(Numbering):
 
 @lru_cache(maxsize=32)
 def space_of(
-    mesh: Meridian, degree: int, anchored: frozenset[str] = frozenset(), ends: tuple[float, ...] = (), prestretch: float = 1.0
+    mesh: Meridian,
+    degree: int,
+    anchored: frozenset[str] = frozenset(),
+    ends: tuple[float, ...] = (),
+    prestretch: float = 1.0,
+    nodal: bool = False,
 ) -> Space:
     """The space of a mesh and a degree, built once."""
-    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch)
+    return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch, nodal=nodal)
 
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch)
+    return moved_space_of(
+        scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies)
+    )
+
+
+@lru_cache(maxsize=32)
+def moved_space_of(
+    mesh: Meridian,
+    degree: int,
+    anchored: frozenset[str],
+    ends: tuple[float, ...],
+    prestretch: float,
+    borders: tuple[tuple[int, float], ...],
+    nodal: bool,
+) -> Space:
+    """The space of a mesh and a degree with some ends of elements elsewhere, see :meth:`Space.with_moved`."""
+    space = space_of(mesh, degree, anchored, ends, prestretch, nodal)
+    return space.with_moved(borders) if borders else space
 
 
 def anchored(scene: Any) -> frozenset[str]:

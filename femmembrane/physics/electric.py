@@ -159,6 +159,11 @@ class Electric:
         if (self.start is not None and self.start == last) or (self.stop is not None and self.stop == first):
             end = "start" if self.start == last else "stop"
             raise InputError(f"electric.{_KEYS[end]}", getattr(self, end), "the electrode would have no width")
+        width = (last if self.stop is None else self.stop) - (first if self.start is None else self.start)
+        if width < _NARROW * (last - first):
+            end = "start" if self.stop is None else "stop"
+            advice = f"the electrode would be {width:.2g} wide; {_NARROW:g} of the length of the meridian, or more, is allowed"
+            raise InputError(f"electric.{_KEYS[end]}", getattr(self, end), advice)
 
     def covers(self, s: Array) -> Array:
         """1 on the electrodes, 0 elsewhere; their first end belongs to them, and their last one does not.
@@ -235,4 +240,6 @@ class Electric:
         return replace(self, relative_permittivity=None, **changes)
 
 
+#: width of an electrode over the length of the meridian that no element can have
+_NARROW = 1e-9
 _KEYS = {"start": "from", "stop": "to"}

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import FINITE, convert, sign, store
+from ..errors import InputError
 from .outline import Outline
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Source:
         rho, eta : float, ndarray or CasADi symbol
             Radius and height of the point, over R0.
         """
-        h_rho, h_z, h_theta = self.field(rho, eta)
+        h_rho, h_z, h_theta = components(self, rho, eta)
         return h_rho**2 + h_z**2 + h_theta**2
 
     def jet(self, rho: Any, eta: Any) -> Any:
@@ -220,9 +221,26 @@ def acting_sources(sources: Sequence[Source], magnetic: bool) -> tuple[Source, .
     return tuple(s for s in sources if getattr(s, "strength", 1.0) != 0) if magnetic else ()
 
 
+def components(source: Source, rho: Any, eta: Any) -> tuple[Any, Any, Any]:
+    """The field of a source, which may be somebody's own.
+
+    Raises
+    ------
+    InputError
+        For an answer that is not three components.
+    """
+    found = source.field(rho, eta)
+    parts = tuple(found) if hasattr(found, "__iter__") else (found,)
+    if len(parts) != 3:
+        allowed = f"field(rho, eta) answers three components (h_rho, h_z, h_theta); this one answers {len(parts)}"
+        raise InputError("source", type(source).__name__, allowed)
+    h_rho, h_z, h_theta = parts
+    return h_rho, h_z, h_theta
+
+
 def magnetic_field(sources: Sequence[Source], rho: Any, eta: Any) -> tuple[Any, Any, Any]:
     """Sum (h_rho, h_z, h_theta) of the fields of all sources at (rho, eta)."""
-    fields = [source.field(rho, eta) for source in sources]
+    fields = [components(source, rho, eta) for source in sources]
     return sum(f[0] for f in fields), sum(f[1] for f in fields), sum(f[2] for f in fields)
 
 

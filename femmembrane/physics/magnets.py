@@ -17,14 +17,15 @@ Sources: J. D. Jackson, Classical Electrodynamics, 3rd ed. (1999), section 5.10 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..checks import number, only, store
+from ..checks import number, only, store, switch
 from ..errors import InputError
 from .magnetics import Array, Source, check_source
+from .obstacles import CylinderObstacle
 from .outline import Outline
 from .scales import Scales
 
@@ -52,7 +53,7 @@ class Jet(NamedTuple):
 class Magnet(Source):
     """Cylinder or ring magnet around the axis, magnetised along it uniformly, by its exact field.
 
-    It is a body: a membrane that comes to it is in contact, and its branch ends there.
+    It is a body: a membrane that comes to it is in contact, and its branch ends there, unless ``body`` lets it go on.
 
     Parameters
     ----------
@@ -67,6 +68,9 @@ class Magnet(Source):
         Of a ring, >= 0 and less than the radius; 0 for a cylinder.
     orientation : {1, -1}
         Sense of the magnetisation; matters only beside another source.
+    body : bool
+        Whether the membrane goes on against it, as against a cylinder with a coating of a tenth of the smaller of its radius and half its
+        length. Otherwise a branch ends where the membrane comes to the magnet.
     remanence : float, optional
         B_r in T, in place of the strength; a catalogue has it (1.28 to 1.32 T for neodymium N42).
     scales : Scales, optional
@@ -95,6 +99,7 @@ class Magnet(Source):
     strength: float
     inner_radius: float = 0.0
     orientation: int = 1
+    body: bool = field(default=False, metadata={"quiet": True})
 
     refusal = ("height", "the membrane meets the magnet at rest; move it off")
 
@@ -107,6 +112,7 @@ class Magnet(Source):
         *,
         inner_radius: float = 0.0,
         orientation: int = 1,
+        body: bool = False,
         remanence: float | None = None,
         scales: Scales | None = None,
     ) -> None:
@@ -119,7 +125,9 @@ class Magnet(Source):
         inner = number("source.inner_radius", inner_radius, allowed, least=0.0)
         if inner >= self.radius:
             raise InputError("source.inner_radius", inner_radius, allowed)
-        store(self, inner_radius=inner)
+        store(self, inner_radius=inner, body=switch("source.body", body))
+        if self.body and self._is_ring:
+            raise InputError("source.body", True, "false is allowed for a ring: contact is computed with cylinders")
         if remanence is not None:
             if not isinstance(scales, Scales):
                 advice = "scales are needed beside a remanence in T (a table [scales] in a scene file); or give the strength"
@@ -127,6 +135,14 @@ class Magnet(Source):
             magnetization = scales.from_si("remanence", number("source.remanence", remanence, "a number >= 0 is allowed (in T)", least=0.0))
             store(self, strength=(magnetization * self._moment) ** 2)
             check_source(self)
+
+    @property
+    def obstacle(self) -> CylinderObstacle | None:
+        """What the membrane cannot enter; None without a body. Next to the edges themselves the field is infinite."""
+        if not self.body:
+            return None
+        coat = 0.1 * min(self.radius, self.length / 2)
+        return CylinderObstacle(self.height, self.radius + coat, self.length + 2 * coat, rounding=coat)
 
     @property
     def magnetization(self) -> Any:

@@ -26,8 +26,11 @@ class Outline:
         Over R0; a z that is infinite ends where the picture ends.
     moment : {1, -1, 0}
         Sense of an arrow along the axis through the middle of the body; 0: no arrow.
+    rigid : bool
+        Whether it is an obstacle, which is drawn in grey and lets through what is behind it.
     """
 
     label: str
     points: tuple[tuple[float, float], ...]
     moment: int = 0
+    rigid: bool = False

@@ -38,7 +38,12 @@ from .template import expressions_of
 if TYPE_CHECKING:
     from ..physics.electric import Electric
     from ..physics.materials import Material
+    from ..physics.obstacles import Obstacle
     from ..scene import Scene
+
+
+#: change of the factor on a voltage or a charge from which a derivative is taken
+_LITTLE_AHEAD = 1e-5
 
 
 class Evaluation:
@@ -139,6 +144,38 @@ class Evaluation:
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
 
+    def carried(self, v: Array) -> Array:
+        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
+        return v
+
+    def brought(self, v: Array) -> Array:
+        """A displacement on the mesh of the scene here, with what may stand behind it."""
+        return v
+
+    def row(self, row: Array) -> Array:
+        """A linear form of :meth:`carried` displacements as one of displacements here."""
+        return row
+
+    def released(self) -> Evaluation | None:
+        """The same state without the nodes that bodies hold by no force; None where there are none."""
+        return None
+
+    def holds(self, unknown: int) -> bool:
+        """Whether a body keeps an unknown from changing."""
+        return False
+
+    def reduced(self, v: Array) -> Array:
+        """A vector, or columns, in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
+        return v
+
+    def expanded(self, v: Array) -> Array:
+        """The displacement of a vector in the unknowns of :attr:`band`."""
+        return v
+
+    def reduced_mass(self, mass: Array) -> Array:
+        """A mass matrix in the unknowns of :attr:`band`."""
+        return mass
+
     def inner(self, x: Array, y: Array) -> float:
         """x . (E'' - P V'') y."""
         own = kernels().inner(self.band, self.potential.space.half_bandwidth, x, y)
@@ -182,6 +219,11 @@ class Evaluation:
     def energy(self) -> float:
         return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
 
+    @property
+    def energy_size(self) -> float:
+        """Sum of the sizes of all energies: what an error of their sum is compared with."""
+        return abs(self.elastic_energy) + abs(self.magnetic_energy) + abs(self.load_energy) + abs(self.electric_energy)
+
 
 class Potential:
     """Discrete potential of a scene.
@@ -198,16 +240,26 @@ class Potential:
         Whether the membrane without load is flat and without stress, so that nothing but a load gives it stiffness across its plane.
     """
 
+    #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
+    obstacles: tuple[Obstacle, ...] = ()
+    unsettled = False
+    #: a potential with the same expressions on other points
+    _like: Potential | None = None
+    symbols: tuple[ca.SX, ca.SX, ca.SX]
+    terms: dict[str, ca.SX]
+
     @BUILDING
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        ends, stretch = scene.element_ends, scene.prestretch
+        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "bodies", ()))
         self.space = (
-            space_of(scene.mesh, scene.degree, fixed, ends, stretch)
+            space_of(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
             if quadrature is None
-            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch)
+            else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch, nodal)
         )
+        if borders := getattr(scene, "borders", ()):
+            self.space = self.space.with_moved(borders)
         space = self.space
         self.sheet = Sheet.of(scene)
         if not space.n_free:
@@ -245,15 +297,28 @@ class Potential:
             if lift is not None:
                 columns |= {name: part for name, part in zip(names, space.lifting_of(lift), strict=True) if part.any()}
         self.point_data: Array = np.stack([c.ravel() for c in columns.values()])
-        with casadi_answers_numpy():
-            given = scene, self.sources, self.loads, tuple(columns), space, forces
-            self.symbols, self.terms = expressions_of(point_expressions, *given)
+        if (like := self._like) is not None:
+            self.symbols, self.terms = like.symbols, like.terms
+            self.__dict__["point_function"] = like.point_function
+        else:
+            with casadi_answers_numpy():
+                given = scene, self.sources, self.loads, tuple(columns), space, forces
+                self.symbols, self.terms = expressions_of(point_expressions, *given)
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
+
+    def placed(self, x: Array) -> Array:
+        """A state with the nodes that bodies hold moved onto them."""
+        return x
 
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
         return 0.0
+
+    @property
+    def root(self) -> Potential:
+        """The potential on the mesh of the scene: this one, unless ends of elements follow borders of contact."""
+        return self
 
     @property
     def surrounded(self) -> bool:
@@ -264,6 +329,18 @@ class Potential:
     def prestressed(self) -> bool:
         """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
         return bool(getattr(self.scene.material, "prestressed", False))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether forces at a state are linear in the factor on sources and loads: those of a charge on electrodes are not, nor where the
+        field changes the width of wrinkles or the thickness."""
+        return self.electric is None or not (self.charged or self.scene.tension_field or hasattr(self.scene.material, "electrified"))
+
+    def factor_derivative(self, evaluation: Evaluation, pressure: float, factor: float) -> Array:
+        """Derivative of the gradient at a state with respect to the factor on sources and loads."""
+        ahead = 1.0 if self.linear else _LITTLE_AHEAD  # where it is linear that is exact
+        difference: Array = self.evaluate(evaluation.x, pressure, factor + ahead).gradient - evaluation.gradient
+        return difference / ahead
 
     @cached_property
     def electric(self) -> Electric | None:
@@ -368,7 +445,7 @@ class Potential:
 
     @cached_property
     def _point(self) -> PointProgram:
-        return PointProgram(self.point_function, self.point_data)
+        return PointProgram(self.point_function, self.point_data, None if self._like is None else self._like._point)
 
     def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
         """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
@@ -531,6 +608,11 @@ class Potential:
         return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
 
     @property
+    def field_operations(self) -> int:
+        """Number of elementary operations of :meth:`field_energy` at one point."""
+        return int(self._field_energy_function.n_instructions())
+
+    @property
     def tilts(self) -> bool:
         """Whether the magnetic energy depends on the slope of the meridian."""
         return self.magnetisation is not None and self.magnetisation.tilts
@@ -580,7 +662,8 @@ def _plain(scene: Scene) -> Scene:
     electric = scene.electricity
     if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
         electric = scene.electric.plain(scene.scales)
-    plain = {"radius_to_thickness": 1.0, "scales": None, "electric": electric}
+    ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
+    plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
     return scene.replace(title="", follow_zones=False, run=None, analysis=type(scene.analysis)(), **plain)
 
 
@@ -593,4 +676,8 @@ def require_elements(scene: Scene) -> None:
 
 @lru_cache(maxsize=64)
 def _potential_of(scene: Scene) -> Potential:
-    return Potential(scene)
+    if not scene.bodies:
+        return Potential(scene)
+    from .contact import ContactPotential
+
+    return ContactPotential(scene)

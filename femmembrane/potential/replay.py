@@ -17,10 +17,19 @@ _BLOCK = 1024
 
 
 class PointProgram:
-    """A scalar function of (data, local variables, parameters) with its data at the points, as :mod:`..kernels` take it."""
+    """A scalar function of (data, local variables, parameters) with its data at the points, as :mod:`..kernels` take it.
 
-    def __init__(self, function: ca.Function, data: Array) -> None:
-        self.function, self.data = function, data
+    Parameters
+    ----------
+    function : casadi.Function
+    data : ndarray
+    like : PointProgram, optional
+        One of the same function, whose instructions it shares.
+    """
+
+    def __init__(self, function: ca.Function, data: Array, like: PointProgram | None = None) -> None:
+        self.function, self.data, self._like = function, data, like
+        self._tapes: dict[tuple[str, ...], Tape | None] = {}
 
     @cached_property
     def _replay(self) -> Replay:
@@ -32,7 +41,12 @@ class PointProgram:
 
     def tape(self, operations: Sequence[str]) -> Tape | None:
         """See :func:`record_tape`."""
-        return record_tape(self.function, operations)
+        if self._like is not None:
+            return self._like.tape(operations)
+        key = tuple(operations)
+        if key not in self._tapes:
+            self._tapes[key] = record_tape(self.function, operations)
+        return self._tapes[key]
 
 
 class Replay:

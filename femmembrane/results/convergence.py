@@ -22,7 +22,6 @@ from . import door
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
     from ..scene import Scene
 
@@ -176,14 +175,21 @@ class Convergence:
         write_csv(path, COLUMNS, self.rows())
 
     def plot(
-        self, path: str | PathLike[str] | None = None, *, quantities: Sequence[str] | None = None, against: str = "unknowns"
-    ) -> Figure:
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        ax: Any = None,
+        quantities: Sequence[str] | None = None,
+        against: str = "unknowns",
+    ) -> Any:
         """Errors against unknowns or element size, one line a degree, one panel a quantity; a Matplotlib figure.
 
         Parameters
         ----------
         path : path, optional
             Where the figure is also written.
+        ax : matplotlib Axes, optional
+            Where to draw one quantity, the first of ``quantities``; the answer is then these axes.
         quantities : sequence of str, optional
             Panels to draw. Default: the pressure (or the volume, where the pressure is held), the eigenvalue at a held volume, and the
             profile in both norms.
@@ -194,7 +200,7 @@ class Convergence:
         InputError
             For an unknown quantity, or a file that cannot be written.
         """
-        return door.plot_convergence(self, path, quantities=quantities, against=against)
+        return door.plot_convergence(self, path, ax, quantities=quantities, against=against)
 
     def _repr_html_(self) -> str:
         """The picture and the table, for notebooks."""

@@ -180,15 +180,24 @@ class Cost:
         """
         files.write_csv(path, COLUMNS, ([None if _absent(value) else value for value in row] for row in self._rows()))
 
-    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+    def plot(self, path: str | PathLike[str] | None = None, *, ax: Any = None, start: str | None = None) -> Any:
         """Error against milliseconds as a Matplotlib figure.
 
         Parameters
         ----------
         path : path, optional
             Where the figure is also written.
+        ax : matplotlib Axes, optional
+            Where to draw one kind of start; the answer is then these axes.
+        start : {"warm", "cold"}, optional
+            The only kind of start that is drawn.
+
+        Raises
+        ------
+        InputError
+            Without solves that converged, for an unknown kind of start, and for a file that cannot be written.
         """
-        return door.plot_cost(self, path)
+        return door.plot_cost(self, path, ax, start)
 
     def _rows(self) -> Iterator[list[Any]]:
         machine = ", ".join(self.machine.values())

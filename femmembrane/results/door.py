@@ -22,9 +22,12 @@ if TYPE_CHECKING:
     from .equilibria import Equilibria
     from .equilibrium import Equilibrium
     from .error_estimate import ErrorEstimate, PlaceEstimate
+    from .fit import Fit
     from .folds import FoldCurve
+    from .postbuckling import Postbuckling
     from .special_point import SpecialPoint
     from .sweep import Sweep
+    from .tipped import TippedBranch, TippedEquilibrium
     from .verdict import Verdict
     from .vibration import Vibration
     from .zones import Zones, ZonesAlong
@@ -53,7 +56,7 @@ def checked_verdict(
     pressure: float,
     evaluation: Evaluation,
     control: str | None,
-    azimuthal: int,
+    azimuthal: int | str,
     guess: Array | None = None,
     compliance: float | None = None,
 ) -> Verdict:
@@ -68,6 +71,20 @@ def natural_frequencies(potential: Potential, x: Array, pressure: float, n: int,
     from ..stability.frequencies import natural_frequencies
 
     return natural_frequencies(potential, x, pressure, n, count, control)
+
+
+def postbuckling(onset: Equilibrium, azimuthal: int) -> Postbuckling:
+    """See :func:`femmembrane.stability.postbuckling.postbuckling`."""
+    from ..stability.postbuckling import postbuckling
+
+    return postbuckling(onset.potential, onset.state, onset.pressure, azimuthal, onset.enclosed)
+
+
+def tipped_verdict(equilibrium: TippedEquilibrium, control: str) -> Verdict:
+    """See :func:`femmembrane.stability.tipped.tipped_verdict`."""
+    from ..stability.tipped import tipped_verdict
+
+    return tipped_verdict(equilibrium, control)
 
 
 def find_zones(scene: Scene, x: Array, pressure: float, criterion: str) -> Zones:
@@ -124,6 +141,27 @@ def eigenvalue_rates(
 # --- pictures and pages
 
 
+def tipped_surface(equilibrium: TippedEquilibrium, angles: Array) -> dict[str, Array]:
+    """See :func:`femmembrane.views.tipped.surface_at`."""
+    from ..views.tipped import surface_at
+
+    return surface_at(equilibrium, angles)
+
+
+def write_tipped_vtk(branch: TippedBranch, path: str | PathLike[str]) -> list[Path]:
+    """See :func:`femmembrane.views.tipped.write_tipped_vtk`."""
+    from ..views.tipped import write_tipped_vtk
+
+    return write_tipped_vtk(branch, path)
+
+
+def plot_tipped(branch: TippedBranch, path: str | PathLike[str] | None, ax: Any, x: str, y: str, label: str) -> Any:
+    """See :func:`femmembrane.views.tipped.plot_tipped`."""
+    from ..views.tipped import plot_tipped
+
+    return plot_tipped(branch, path, ax, x, y, label)
+
+
 def plot_pressure_volume(branch: Branch, path: str | PathLike[str] | None = None, units: str = "scaled") -> Any:
     """See :func:`femmembrane.views.plots.plot_pressure_volume`."""
     from ..views.plots import plot_pressure_volume
@@ -154,32 +192,52 @@ def draw_zones(axes: Any, branch: Branch) -> Sequence[Any]:
     return draw_zones(axes, branch)
 
 
-def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -> Any:
+def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None, ax: Any = None, y: str = "pressure") -> Any:
     """See :func:`femmembrane.views.folds.plot_fold_curve`."""
     from ..views.folds import plot_fold_curve
 
-    return plot_fold_curve(curve, path)
+    return plot_fold_curve(curve, path, ax=ax, y=y)
 
 
-def plot_convergence(study: Convergence, path: str | PathLike[str] | None, quantities: Sequence[str] | None, against: str) -> Any:
+def plot_convergence(study: Convergence, path: str | PathLike[str] | None, ax: Any, quantities: Sequence[str] | None, against: str) -> Any:
     """See :func:`femmembrane.views.convergence.plot_convergence`."""
     from ..views.convergence import plot_convergence
 
-    return plot_convergence(study, path, quantities=quantities, against=against)
+    return plot_convergence(study, path, ax=ax, quantities=quantities, against=against)
 
 
-def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Any:
+def plot_cost(study: Cost, path: str | PathLike[str] | None = None, ax: Any = None, start: str | None = None) -> Any:
     """See :func:`femmembrane.views.cost.plot_cost`."""
     from ..views.cost import plot_cost
 
-    return plot_cost(study, path)
+    return plot_cost(study, path, ax=ax, start=start)
 
 
-def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Any:
+def plot_fit(fit: Fit, path: str | PathLike[str] | None = None) -> Any:
+    """See :func:`femmembrane.views.fit.plot_fit`."""
+    from ..views.fit import plot_fit
+
+    return plot_fit(fit, path)
+
+
+def write_fit_report(fit: Fit, path: str | PathLike[str]) -> None:
+    """See :func:`femmembrane.views.fit.write_fit_report`."""
+    from ..views.fit import write_fit_report
+
+    write_fit_report(fit, path)
+
+
+def plot_grid(
+    sweep: Sweep,
+    path: str | PathLike[str] | None = None,
+    show: Sequence[str] | None = None,
+    units: str = "scaled",
+    ax: Any = None,
+) -> Any:
     """See :func:`femmembrane.views.grid.plot_grid`."""
     from ..views.grid import plot_grid
 
-    return plot_grid(sweep, path, show, units)
+    return plot_grid(sweep, path, show, units, ax)
 
 
 def write_vtk(branch: Sequence[Equilibrium], path: str | PathLike[str]) -> list[Path]:
@@ -201,6 +259,13 @@ def write_report(branch: Branch, path: str | PathLike[str], units: str = "scaled
     from ..views.report import write_report
 
     write_report(branch, path, units=units)
+
+
+def write_explorer(branch: Branch, path: str | PathLike[str], units: str = "scaled") -> None:
+    """See :func:`femmembrane.views.explorer.write_explorer`."""
+    from ..views.explorer import write_explorer
+
+    write_explorer(branch, path, units=units)
 
 
 def branch_html(branch: Branch) -> str:

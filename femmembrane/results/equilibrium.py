@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
-from ..scene import WRINKLING
+from ..scene import ALL, WRINKLING
 from ..scene.variation import Parameter
-from ..solve.controls import control_kind
+from ..solve.controls import check_height, control_kind
 from ..solve.newton import relative_residual
 from ..threads import one_thread
 from . import door
+from .contact import Contact, contact_of
 
 if TYPE_CHECKING:
     from ..potential import Evaluation, Potential
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
-_OF_POTENTIAL = ("verdict", "errors", "tangent")
+_OF_POTENTIAL = ("verdict", "errors", "tangent", "contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +133,7 @@ class Equilibrium:
 
     @property
     def _electric(self) -> dict[str, float]:
-        own = self.scene.electric
-        if own is not None and self.scene.electricity is None:  # no voltage or charge on electrodes that have a capacitance
-            plain = replace(own.plain(self.scene.scales), **{own.load: 1.0})
-            found = self.in_scene(self.scene.replace(electric=plain, scales=None))._electric
-            return {**dict.fromkeys(found, 0.0), "capacitance": found["capacitance"]}
-        return self.remembered(("electric",), lambda: self.potential.electric_quantities(self.state))
+        return self.remembered(("electric",), lambda: electric_of(self.scene, self.state))
 
     @property
     def potential(self) -> Potential:
@@ -145,6 +141,13 @@ class Equilibrium:
         from ..potential import potential_of
 
         return potential_of(self.scene)
+
+    @property
+    def contact(self) -> Contact | None:
+        """Contact with the bodies of the scene, see :class:`~femmembrane.results.contact.Contact`; None where it has none."""
+        if not self.scene.bodies:
+            return None
+        return self.remembered(("contact",), lambda: contact_of(self.potential.evaluate(self.state, self.pressure)))
 
     def number(self, name: str) -> float:
         """A number of its scene.
@@ -230,7 +233,11 @@ class Equilibrium:
         InputError
             For radii outside the membrane.
         """
-        return door.profile_at(self.scene, self.state, self.pressure, self.places(r)).columns(self.scene.converter)
+        s = self.places(r)
+        columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.converter)
+        if (contact := self.contact) is not None:
+            columns |= {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
+        return columns
 
     def places(self, r: ArrayLike | None = None) -> Array:
         """Parameters of the meridian at reference radii, see :meth:`profile`.
@@ -241,17 +248,22 @@ class Equilibrium:
             Default: the nodes.
         """
         space = self.potential.space
+        if r is None:
+            space = self.potential.root.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
-    def verdict(self, control: str | None = None, *, azimuthal: int = 0, gas: Gas | None = None, electric: str | None = None) -> Verdict:
+    def verdict(
+        self, control: str | None = None, *, azimuthal: int | str = 0, gas: Gas | None = None, electric: str | None = None
+    ) -> Verdict:
         """Stability against one class of perturbations; computed once and remembered.
 
         Parameters
         ----------
         control : {"pressure", "volume", "gas"}
             What is held against axisymmetric perturbations. Left out for azimuthal perturbations, which do not change the volume.
-        azimuthal : int
-            Number of waves around the axis; 0 for axisymmetric perturbations.
+        azimuthal : int or "all"
+            Number of waves around the axis; 0 for axisymmetric perturbations. With "all" the number whose smallest eigenvalue is the
+            lowest is looked for among all that can matter (``femmembrane.stability.worst_waves``); it is the ``azimuthal`` of the verdict.
         gas : Gas, optional
             For control "gas": the enclosed gas. Default: the gas under which this equilibrium was found, or the amount in the chamber of
             the scene that holds it.
@@ -264,11 +276,10 @@ class Equilibrium:
         InputError
             For an unknown control, or for arguments that do not go together.
         """
-        if not (control is None or isinstance(control, str)) or not isinstance(azimuthal, (int, np.integer)):
+        counted = isinstance(azimuthal, (int, np.integer)) or (isinstance(azimuthal, str) and azimuthal == ALL)
+        if not (control is None or isinstance(control, str)) or not counted:
             raise InputError(
-                "control" if isinstance(azimuthal, (int, np.integer)) else "azimuthal",
-                control or azimuthal,
-                "a name and a number are allowed",
+                "control" if counted else "azimuthal", control or azimuthal, 'a name and a number are allowed, or azimuthal="all"'
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
@@ -305,7 +316,7 @@ class Equilibrium:
         return door.gas(amount, chamber.volume, chamber.atmosphere) if amount > 0 and self.volume > -chamber.volume else None
 
     @one_thread
-    def _judged(self, potential: Potential, control: str | None, azimuthal: int, gas: Gas | None) -> Verdict:
+    def _judged(self, potential: Potential, control: str | None, azimuthal: int | str, gas: Gas | None) -> Verdict:
         evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
         return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
@@ -404,6 +415,8 @@ class Equilibrium:
             For an unknown control.
         """
         held = control_kind(control).name
+        if held == "center_height":
+            check_height("control", self.potential)
 
         def estimate() -> ErrorEstimate:
             verdicts = {c: self.verdict(c) for c in ("pressure", "volume")}
@@ -478,16 +491,32 @@ class Equilibrium:
         return sensitivity_of(self, of, to, held, Along(r, control, azimuthal))
 
     def _repr_html_(self) -> str:
-        """Numbers and verdicts with the deformed meridian, for notebooks."""
+        """The membrane in space with its verdicts, for notebooks; a still picture with numbers where scripts are not allowed."""
         return door.equilibrium_html(self)
 
 
 def _places(r: ArrayLike, ends: Array, what: str) -> Array:
-    s = np.atleast_1d(np.asarray(r, dtype=float))
+    allowed = f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed"
+    try:
+        s = np.atleast_1d(np.asarray(r, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("r", r, allowed) from None
     margin = LEAST_LENGTH * float(ends[-1])  # a computed end is exact to round-off only
-    if not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
-        raise InputError("r", r, f"{what} in [{ends[0]:g}, {ends[-1]:g}] are allowed")
+    if s.ndim != 1 or not ((s >= ends[0] - margin) & (s <= ends[-1] + margin)).all():
+        raise InputError("r", r, allowed)
     return np.clip(s, ends[0], ends[-1])
+
+
+def electric_of(scene: Scene, x: Array) -> dict[str, float]:
+    """Voltage, charge, capacitance and largest field of a state; electrodes without a voltage or charge have a capacitance as well."""
+    from ..potential import potential_of
+
+    own = scene.electric
+    if own is None or scene.electricity is not None:
+        return potential_of(scene).electric_quantities(x)
+    plain = replace(own.plain(scene.scales), **{own.load: 1.0})
+    found = potential_of(scene.replace(electric=plain, scales=None)).electric_quantities(x)
+    return {**dict.fromkeys(found, 0.0), "capacitance": found["capacitance"]}
 
 
 def recorded(

@@ -51,8 +51,8 @@ class ErrorEstimate:
     ----------
     control : {"volume", "pressure", "center_height"}
         What is held while the space is refined: its own error is 0.
-    pressure, volume, center_height, elastic_energy, magnetic_energy, energy : Deviation
-        ``energy`` is elastic, magnetic and load energy together.
+    pressure, volume, center_height, elastic_energy, magnetic_energy, load_energy, electric_energy, energy : Deviation
+        ``energy`` is all of them together. Energies that the scene does not have are 0.
     lambda_pressure, lambda_volume : Deviation
         Smallest eigenvalues of the second variation under pressure and volume control.
     displacement : Deviation
@@ -71,6 +71,8 @@ class ErrorEstimate:
     center_height: Deviation
     elastic_energy: Deviation
     magnetic_energy: Deviation
+    load_energy: Deviation
+    electric_energy: Deviation
     energy: Deviation
     lambda_pressure: Deviation
     lambda_volume: Deviation
@@ -80,13 +82,18 @@ class ErrorEstimate:
     method: str
     reason: str = ""
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The quantities that tables show: those of loads and of a voltage or charge where there is such an energy."""
+        return tuple(name for name in ESTIMATED if name not in _PARTS[2:] or abs(getattr(self, name).value) > 0)
+
     def _repr_html_(self) -> str:
         """A table of values and errors, for notebooks."""
         return door.error_estimate_html(self)
 
     def __str__(self) -> str:
         lines = [f"at the same {CONTROLS[self.control].words}; {self.method}", f"{'':<16}{'value':>16}{'error':>12}{'relative':>12}"]
-        for name in ESTIMATED:
+        for name in self.shown:
             d: Deviation = getattr(self, name)
             lines.append(f"{words(name):<16}{d.value:>16.9g}{d.error:>12.2e}{d.relative:>12.2e}")
         return "\n".join(lines + ([self.reason] if self.reason else []))
@@ -127,6 +134,8 @@ def place_from_numbers(values: Mapping[str, float], better: Mapping[str, float] 
     )
 
 
+#: the parts of the energy
+_PARTS = ("elastic_energy", "magnetic_energy", "load_energy", "electric_energy")
 #: the quantities of an estimate, in its order
 ESTIMATED = tuple(f.name for f in fields(ErrorEstimate) if f.type == "Deviation")
 
@@ -135,6 +144,6 @@ def from_numbers(control: str, values: Mapping[str, float], errors: Mapping[str,
     """The record of values and errors by name."""
     values, errors = ({name: numbers.get(name, np.nan) for name in ESTIMATED} for numbers in (values, errors))  # older files have fewer
     scales = {name: abs(value) for name, value in values.items()}
-    scales["energy"] = scales["elastic_energy"] + scales["magnetic_energy"]
+    scales["energy"] = float(np.nansum([scales[name] for name in _PARTS]))
     parts = {name: Deviation(values[name], errors[name], scales[name]) for name in ESTIMATED}
     return ErrorEstimate(control_kind(control).name, **parts, method=method, reason=reason)

@@ -103,12 +103,21 @@ class FoldCurve:
 
         return pandas.DataFrame({self.parameter: self.values, **{name: getattr(self, name) for name in _COLUMNS}})
 
-    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+    def plot(self, path: str | PathLike[str] | None = None, *, ax: Any = None, y: str = "pressure") -> Any:
         """Pressure and volume of the fold against the number as a Matplotlib figure.
 
         Parameters
         ----------
         path : path, optional
             Where the figure is also written.
+        ax : matplotlib Axes, optional
+            Where to draw one quantity of the fold; the answer is then these axes.
+        y : {"pressure", "volume", "center_height"}
+            This quantity.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity, and for a file that cannot be written.
         """
-        return door.plot_fold_curve(self, path)
+        return door.plot_fold_curve(self, path, ax, y)

@@ -39,8 +39,8 @@ SURFACES_FOLDER = "membrane"
 def run_files() -> tuple[str, ...]:
     """All files that a run may leave behind, in the order in which they are listed."""
     tables, pictures = ([name for a in registered() for name in getattr(a, kind)] for kind in ("tables", "pictures"))
-    last = "report.html"  # written from the rest, by whom it is asked for
-    return ("branch.csv", "special_points.csv", *tables, RECORD, "branch.nc", *DIAGRAMS, *pictures, SURFACES, last)
+    pages = ("report.html", "explore.html")  # written from the rest, by whom they are asked for
+    return ("branch.csv", "special_points.csv", *tables, RECORD, "branch.nc", *DIAGRAMS, *pictures, SURFACES, *pages)
 
 
 def write_run(

@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import choice
 from ..errors import InputError, SolveError, Status, unknown_name
 from ..quantities import PROFILE, quantity
 from ..scene.run import GAS, PRESCRIBED
 from ..scene.variation import Scale
-from ..solve.controls import CONTROLS, Control
+from ..solve.controls import CONTROLS, Control, check_height
 from ..solve.sensitivity import FOLDS, Rates, Sensitive, differentiated, sensitive
 from ..solve.state import inner
 from . import door
+from .equilibrium import electric_of
 
 if TYPE_CHECKING:
     from ..potential import Potential
@@ -160,9 +162,7 @@ def _floats(values: Array) -> list[Answer]:
 
 
 def _electric(moved: tuple[Scene, Array, float], name: str) -> float:
-    from ..potential import potential_of
-
-    return potential_of(moved[0]).electric_quantities(moved[1])[name]
+    return electric_of(*moved[:2])[name]
 
 
 def _energy(moved: tuple[Scene, Array, float], name: str) -> float:
@@ -246,6 +246,8 @@ def _listed(key: str, given: Any) -> tuple[str, ...]:
 
 def _known(scene: Scene, to: Any) -> Sensitive:
     """The derivatives of the equations of a scene with respect to numbers that it has."""
+    if scene.bodies:
+        raise InputError("to", to, "sensitivities are not computed beside an obstacle")
     try:
         return sensitive(scene, _listed("to", to))
     except InputError as error:
@@ -260,9 +262,9 @@ def _control(eq: Equilibrium, held: str | None) -> Control:
         run = eq.scene.run
         prescribed = None if run is None else run.quantity
         held = GAS if eq.gas is not None else prescribed if prescribed in HELD else "volume"
-    if held not in HELD:
-        raise unknown_name("held", held, dict.fromkeys(HELD.values()))
-    name = HELD[held]
+    name = HELD[choice("held", held, HELD)]
+    if name == "center_height":
+        check_height("held", eq.potential)
     if name != GAS:
         return CONTROLS[name].at(float(getattr(eq, name)))
     gas = eq.enclosed

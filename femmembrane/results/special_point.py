@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import door
 from .equilibrium import Equilibrium
 from .error_estimate import PlaceEstimate
+from .postbuckling import Postbuckling, not_an_onset
 
 Array = NDArray[np.float64]
 
@@ -109,6 +110,32 @@ class SpecialPoint:
         from .sensitivities import Along, sensitivity_of_point
 
         return sensitivity_of_point(self, of, to, Along(r, control, azimuthal))
+
+    @property
+    def postbuckling(self) -> Postbuckling:
+        """Of an azimuthal onset: whether the membrane leans over gradually beyond it or jumps; found when first asked for.
+
+        Raises
+        ------
+        InputError
+            For a special point of another kind.
+
+        Examples
+        --------
+        A strong dipole below the membrane: below a certain height of the pole the membrane tips over to one side, and jumps.
+
+        >>> import femmembrane as fm
+        >>> rubber = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
+        >>> dipole, asked = fm.Dipole(strength=600, height=-3.5), fm.Analysis(azimuthal_modes=(1,))
+        >>> scene = fm.Scene(material=rubber, sources=[dipole], susceptibility=2.5, mesh=fm.disc(8), degree=6, analysis=asked)
+        >>> branch = fm.trace(scene, start=0.5, direction=-1, until={"center_height": 0.3})
+        >>> onset = next(point for point in branch.special_points if point.kind == "azimuthal_onset")
+        >>> onset.postbuckling.kind, round(onset.postbuckling.coefficient, 2), onset.postbuckling.held("pressure").kind
+        ('subcritical', -43.18, 'supercritical')
+        """
+        if self.kind != "azimuthal_onset":
+            raise not_an_onset(self.kind)
+        return self.equilibrium.remembered(("postbuckling", self.azimuthal), lambda: door.postbuckling(self.equilibrium, self.azimuthal))
 
     def __repr__(self) -> str:
         over = {self.over: self.number} if self.over else {}

@@ -57,6 +57,7 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
     }
     scalars = [name for name in _SCALARS if name not in absent]
     return {
+        **_border_variables(equilibria, dimension, prefix),
         **{prefix + name: ((dimension,), typed(name, (getattr(e, name) for e in equilibria))) for name in scalars},
         prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
         prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
@@ -74,6 +75,24 @@ def _own_meshes(equilibria: Sequence[Equilibrium], width: int, dimension: str, p
     return {prefix + "element_ends": ((dimension, "element_end"), ends), **states}
 
 
+def _border_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str) -> dict[str, Variable]:
+    """Ends of elements at borders of contact, with their places: as many columns as an equilibrium has most."""
+    most = max((len(e.scene.borders) for e in equilibria), default=0)
+    if not most:
+        return {}
+    ends, places = np.full((len(equilibria), most), -1), np.full((len(equilibria), most), np.nan)
+    for k, equilibrium in enumerate(equilibria):
+        for j, (end, place) in enumerate(equilibrium.scene.borders):
+            ends[k, j], places[k, j] = end, place
+    shape = dimension, prefix + "border"
+    return {prefix + "border_end": (shape, ends), prefix + "border_place": (shape, places)}
+
+
+def _borders_of(dataset: xarray.Dataset, prefix: str) -> list[tuple[tuple[int, float], ...]]:
+    ends, places = dataset[prefix + "border_end"].values.tolist(), dataset[prefix + "border_place"].values.tolist()
+    return [tuple((int(k), float(s)) for k, s in zip(*row, strict=True) if k >= 0) for row in zip(ends, places, strict=True)]
+
+
 def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str = "") -> list[Equilibrium]:
     """The equilibria of a scene, or of scenes that differ in the number ``over``; ``prefix`` is that of their variables."""
     count = len(dataset[prefix + "status"])
@@ -84,6 +103,8 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
     scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
     scalars.setdefault("magnetic_energy", [0.0] * count)
     scenes = [scene] * count
+    if prefix + "border_end" in dataset:
+        scenes = [scene.bordered(borders) for borders in _borders_of(dataset, prefix)]
     if over:
         scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
     on_branch: list[Equilibrium | None] = [None] * count

@@ -104,13 +104,17 @@ class Sweep:
         """The scales that all scenes have; None where they have none, or where these differ."""
         return common_scales(self.scene, self.over)
 
-    def plot(self, path: str | PathLike[str] | None = None, *, show: Sequence[str] | None = None, units: str = "scaled") -> Any:
+    def plot(
+        self, path: str | PathLike[str] | None = None, *, ax: Any = None, show: Sequence[str] | None = None, units: str = "scaled"
+    ) -> Any:
         """Maps over two keys, or curves over one, as a Matplotlib figure.
 
         Parameters
         ----------
         path : path, optional
             Where the figure is also written.
+        ax : matplotlib Axes, optional
+            Where to draw one variable, the first of ``show``; the answer is then these axes.
         show : sequence of str, optional
             Variables of the data set. A variable with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
             most telling variables of the quantity.
@@ -122,7 +126,7 @@ class Sweep:
         InputError
             For an unknown variable, for three keys or more, or a file that cannot be written.
         """
-        return door.plot_grid(self, path, show, units)
+        return door.plot_grid(self, path, show, units, ax)
 
 
 @dataclass(frozen=True)

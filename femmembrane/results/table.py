@@ -108,7 +108,7 @@ def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
     """One row for each special point of the branch, in the order of :func:`special_point_columns`."""
     values = [
         *(partial(_attribute, name=name) for name in _located_by(branch)),
-        *(partial(analysis.point_value, column=name) for analysis, name in _of_points(branch.scene)),
+        *(partial(analysis.point_value, column=name) for analysis, name in _of_points(branch)),
     ]
     for point in branch.special_points or ():
         yield [value(point) for value in values]
@@ -123,14 +123,15 @@ def _attribute(point: SpecialPoint, name: str) -> Any:
     return point.equilibrium.number(name) if "." in name else getattr(point, name)
 
 
-def _of_points(scene: Scene) -> list[tuple[EquilibriumAnalysis, str]]:
-    return [(analysis, name) for analysis in asked(scene) for name in analysis.point_columns(scene)]
+def _of_points(branch: Branch) -> list[tuple[EquilibriumAnalysis, str]]:
+    scene, points = branch.scene, branch.special_points or ()
+    return [(each, name) for each in asked(scene) for name in (*each.point_columns(scene), *each.found_columns(points))]
 
 
 def special_point_columns(branch: Branch) -> list[str]:
     """Columns of ``special_points.csv``: kind, a number that changes along the branch, volume, pressure, center_height, error, and those of
     the analyses of the scene."""
-    return [*_located_by(branch), *(name for _, name in _of_points(branch.scene))]
+    return [*_located_by(branch), *(name for _, name in _of_points(branch))]
 
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:

@@ -43,6 +43,9 @@ class Verdict:
         Number of negative eigenvalues, by inertia.
     reason : str
         What the verdict rests on, in words.
+    wavelength : float
+        Over R0, for waves around the axis of a sheet with bending: the length of a wave on the circle where the mode is largest, as
+        deformed. NaN elsewhere.
     coefficients : ndarray or None
         Coefficients of the mode on the free degrees of freedom, normalised in the mass of the reference area.
     """
@@ -57,6 +60,7 @@ class Verdict:
     coefficients: Array | None = field(default=None, repr=False)
     _shape: Shape | None = field(default=None, repr=False)
     _unresolved: float = field(default=0.0, repr=False)
+    wavelength: float = field(default=np.nan, repr=False, kw_only=True)
 
     @property
     def mode(self) -> Mapping[str, Array] | None:

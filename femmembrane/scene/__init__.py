@@ -1,5 +1,6 @@
 """What exists and what is asked of it: the scene, its tables in a file, single keys of them, and numbers that vary."""
 
+from .analysis import ALL as ALL
 from .analysis import MAX_WAVES as MAX_WAVES
 from .analysis import VERDICTS as VERDICTS
 from .analysis import WRINKLING as WRINKLING

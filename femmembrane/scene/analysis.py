@@ -13,6 +13,8 @@ VERDICTS = ("pressure", "volume", "gas")
 WRINKLING = ("total", "mechanical")
 #: largest number of waves around the axis, a thousand times more than a mesh resolves
 MAX_WAVES = 10**6
+#: in place of a number of waves: the one with the lowest eigenvalue
+ALL = "all"
 
 
 @dataclass(frozen=True)
@@ -23,21 +25,25 @@ class Perturbations:
     ----------
     control : str or None
         What is held against axisymmetric perturbations; None for azimuthal ones, which do not change the volume.
-    azimuthal : int
-        Number of waves around the axis; 0 for axisymmetric perturbations.
+    azimuthal : int or "all"
+        Number of waves around the axis; 0 for axisymmetric perturbations; "all" for whichever number is the worst.
     """
 
     control: str | None
-    azimuthal: int = 0
+    azimuthal: int | str = 0
 
     @property
     def tag(self) -> str:
-        """With what the names of its columns end: pressure, volume, n1, n2, ..."""
+        """With what the names of its columns end: pressure, volume, n1, n2, ..., all."""
+        if self.azimuthal == ALL:
+            return ALL
         return f"n{self.azimuthal}" if self.azimuthal else str(self.control)
 
     @property
     def brief(self) -> str:
         """The class in a word or two."""
+        if self.azimuthal == ALL:
+            return "any n"
         return f"n = {self.azimuthal}" if self.azimuthal else str(self.control)
 
     @property
@@ -53,6 +59,8 @@ class Perturbations:
     @property
     def words(self) -> str:
         """The class in full."""
+        if self.azimuthal == ALL:
+            return "any number of waves around the axis"
         return f"{self.brief} waves around the axis" if self.azimuthal else f"axisymmetric, {self.held}"
 
 
@@ -64,8 +72,9 @@ class Analysis:
     ----------
     stability : sequence of {"pressure", "volume", "gas"}
         Controls under which the verdict on axisymmetric perturbations is given; with gas its amount in the chamber of the scene is held.
-    azimuthal_modes : sequence of int
-        Circumferential wave numbers n >= 1 for which the verdict is given.
+    azimuthal_modes : sequence of int, or "all"
+        Circumferential wave numbers n >= 1 for which the verdict is given; "all" for the one whose eigenvalue is the lowest, which is
+        looked for in every equilibrium.
     wrinkling : {"total", "mechanical"}, optional
         The principal stresses whose signs divide the membrane into taut and wrinkled zones; left out: no zones are looked for.
     error_estimates : bool
@@ -80,18 +89,19 @@ class Analysis:
     """
 
     stability: tuple[str, ...] = ()
-    azimuthal_modes: tuple[int, ...] = ()
+    azimuthal_modes: tuple[int | str, ...] = ()
     wrinkling: str | None = None
     error_estimates: bool = False
     extra: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         stability = sequence("analysis.stability", self.stability, 'a list is allowed, of "pressure", "volume" and "gas"')
-        modes = sequence("analysis.azimuthal_modes", self.azimuthal_modes, "a list of whole numbers >= 1 is allowed")
+        given = (ALL,) if isinstance(self.azimuthal_modes, str) and self.azimuthal_modes == ALL else self.azimuthal_modes
+        modes = sequence("analysis.azimuthal_modes", given, _MODES)
         extra = sequence("analysis.extra", self.extra, _NAMES)
         for k, name in enumerate(stability):
             choice(f"analysis.stability[{k}]", name, VERDICTS)
-        modes = tuple(whole(f"analysis.azimuthal_modes[{k}]", n, most=MAX_WAVES) for k, n in enumerate(modes))
+        modes = tuple(_waves(f"analysis.azimuthal_modes[{k}]", n) for k, n in enumerate(modes))
         for k, name in enumerate(extra):
             if not isinstance(name, str) or not name:
                 raise InputError(f"analysis.extra[{k}]", name, _NAMES)
@@ -113,6 +123,11 @@ class Analysis:
         return self.wrinkling or "total"
 
 
+def _waves(key: str, n: Any) -> int | str:
+    return n if isinstance(n, str) and n == ALL else whole(key, n, most=MAX_WAVES)
+
+
+_MODES = 'a list of whole numbers >= 1 is allowed, or "all"'
 _NAMES = "a list of names of registered analyses is allowed"
 
 

@@ -9,6 +9,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
     [membrane]                   attributes of Scene, listed in SCENE_KEYS
     [[source]]  kind, ...        a class of SOURCES and its arguments
     [[load]]    kind, ...        a class of LOADS and its arguments
+    [[obstacle]] kind, ...       a class of OBSTACLES and its arguments; of a mould also file, from the folder of the scene
     [mesh]      shape, ...       a class of SHAPES and its arguments; degree is an attribute of Scene
                 file, ...        or a mesh file and what else FILE_KEYS lists; the scene keeps its points
     [electric]                   Electric
@@ -52,6 +53,7 @@ from ..physics.magnetics import Dipole
 from ..physics.magnets import Magnet
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
 from ..physics.named import material
+from ..physics.obstacles import Ball, CylinderObstacle, Mould, Plane
 from ..physics.scales import Scales
 from ..physics.sources import Loop, Solenoid, Uniform, Wire
 from ..physics.tabulated import Tabulated
@@ -87,6 +89,7 @@ SOURCES: dict[str, Any] = {
     "wire": Wire,
 }
 LOADS: dict[str, Any] = {"hub-force": HubForce, "hydrostatic": Hydrostatic, "weight": Weight}
+OBSTACLES: dict[str, Any] = {"ball": Ball, "cylinder": CylinderObstacle, "mould": Mould, "plane": Plane}
 SHAPES: dict[str, Any] = {
     "disc": Disc,
     "annulus": Annulus,
@@ -104,7 +107,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
     "mesh": ("degree", "follow_zones"),
-    "effects": ("tension_field", "demagnetization"),
+    "effects": ("tension_field", "demagnetization", "bending"),
 }
 #: arguments of Electric whose keys are words that Python keeps for itself, or stand beside one
 ELECTRIC_KEYS = {"start": "from", "stop": "to"}
@@ -177,7 +180,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     if not isinstance(data, Mapping):
         raise InputError("scene", data, "a mapping of the tables of a scene file is allowed")
     _refuse_unknown("", data, ("title", "units", *_known_keys()))
-    tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name not in ("source", "load")}
+    tables = {name: _table(name, data.get(name, {})) for name in _known_keys() if name not in ("source", "load", "obstacle")}
     arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
     for table in SCENE_KEYS.keys() - {"mesh"}:
         _refuse_unknown(table, tables[table], SCENE_KEYS[table])
@@ -186,6 +189,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         material=material_of(tables["material"]),
         sources=_build_list("source", SOURCES, data.get("source", ()), scales),
         loads=_build_list("load", LOADS, data.get("load", ())),
+        obstacles=_build_list("obstacle", OBSTACLES, _with_points(data.get("obstacle", ()), folder)),
         mesh=_build_mesh(tables["mesh"], folder),
         run=_build("run", Run, tables["run"]) if "run" in data else None,
         analysis=_build("analysis", Analysis, tables["analysis"]),
@@ -211,6 +215,7 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         **{table: {name: getattr(scene, name) for name in names} for table, names in SCENE_KEYS.items() if table != "mesh"},
         "source": [_describe("source", "kind", SOURCES, source) for source in scene.sources],
         "load": [_describe("load", "kind", LOADS, load) for load in scene.loads],
+        "obstacle": [_describe("obstacle", "kind", OBSTACLES, body) for body in scene.obstacles],
         "mesh": {
             **_describe("mesh", "shape", SHAPES, scene.mesh),
             "degree": scene.degree,
@@ -248,6 +253,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model", "name"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind", "remanence"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
+    keys["obstacle"] = {"kind", "file"} | arguments(*OBSTACLES.values())
     keys["mesh"] |= {"shape", "file", "unit", *FILE_KEYS} | arguments(*SHAPES.values())
     keys["electric"] = {ELECTRIC_KEYS.get(name, name) for name in arguments(Electric)}
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales), "chamber": arguments(Chamber)}
@@ -338,6 +344,24 @@ def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Sca
         except InputError as error:  # it does not know its place in the list
             raise InputError(re.sub(rf"^{name}(?=\.)", path, error.key), error.value, error.allowed) from None
     return tuple(items)
+
+
+def _with_points(tables: Any, folder: Path) -> Any:
+    """The tables of obstacles with the points of moulds that are in files."""
+    if not isinstance(tables, (list, tuple)):
+        return tables
+    found = []
+    for k, table in enumerate(tables):
+        if isinstance(table, Mapping) and table.get("kind") == "mould" and "file" in table:
+            key = f"{item_path('obstacle', k, len(tables))}.file"
+            if not isinstance(table["file"], str):
+                raise InputError(key, table["file"], "the path of a text file is allowed, from the folder of the scene")
+            if "points" in table:
+                raise InputError(key, table["file"], "not allowed beside points; leave one out")
+            rest = {name: value for name, value in table.items() if name != "file"}
+            table = rest | {"points": Mould.from_file(folder / table["file"]).points}
+        found.append(table)
+    return found
 
 
 def _with_strength(table: Mapping[str, Any], scales: Scales | None) -> dict[str, Any]:

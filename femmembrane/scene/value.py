@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -23,11 +23,13 @@ from ..physics.along import Along
 from ..physics.chamber import Chamber
 from ..physics.electric import Electric
 from ..physics.loads import Load, on_hubs
-from ..physics.magnetics import Source
+from ..physics.magnetics import Source, components
 from ..physics.materials import Material
 from ..physics.named import material_data
+from ..physics.obstacles import Obstacle
 from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
+from .bodies import check_obstacles
 from .magnetisation import checked_magnetisation, refuse_magnetisation
 from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
@@ -66,7 +68,7 @@ class Scene:
     susceptibility : float, optional
         Magnetic susceptibility chi >= 0 of the membrane; required as soon as there is a source, unless there is a remanence.
     radius_to_thickness : float, optional
-        R0/T > 0; it enters the total stresses only. Left out: the ratio of the scales, or 1000 without scales.
+        R0/T > 0; it enters the total stresses, and bending. Left out: the ratio of the scales, or 1000 without scales.
     tension_field : bool
         Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
     follow_zones : bool
@@ -103,6 +105,15 @@ class Scene:
         The chamber of gas behind the membrane, for runs by amounts of gas and verdicts at a held amount.
     electric : Electric, optional
         A voltage or a charge on the faces of the membrane. Without one nothing electric is built.
+    bending : bool
+        Whether verdicts count the bending stiffness of the sheet (:mod:`~femmembrane.stability.bending`), which chooses the number of
+        waves where the membrane is compressed. Equilibria do not change. It needs a ``radius_to_thickness`` that is given, by itself or by
+        scales, and elements of degree 2 or higher.
+    obstacles : sequence of Obstacle
+        Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
+    borders : tuple of (int, float)
+        Found with an equilibrium in contact, and not to be given: ends of elements that stand at the borders of contact, by their numbers,
+        with their places along the meridian.
 
     Raises
     ------
@@ -146,6 +157,11 @@ class Scene:
     remanence_transport: str | None = None
     chamber: Chamber | None = None
     electric: Electric | None = None
+    bending: bool = False
+    #: whether R0/T was given, by itself or by scales
+    _thickness_given: ClassVar[bool] = False
+    obstacles: tuple[Obstacle, ...] = ()
+    borders: tuple[tuple[int, float], ...] = field(default=(), repr=False, metadata={"found": True})
 
     def __post_init__(self) -> None:
         _check_interface("material", self.material, ("energy", "stress"), "a material is allowed, such as Ogden(mu=..., alpha=...)")
@@ -168,13 +184,21 @@ class Scene:
             _check_interface(
                 "electric", self.electric, ("voltage", "plain", "covers"), "an Electric is allowed, such as Electric(voltage=0.3)"
             )
+        obstacles = sequence("obstacle", self.obstacles, "a list of obstacles is allowed, such as [Plane(height=0.5)]")
+        for k, body in enumerate(obstacles):
+            allowed = "an obstacle is allowed, such as Plane(height=0.5)"
+            _check_interface(item_path("obstacle", k, len(obstacles)), body, ("pieces", "touch", "facing"), allowed)
         scales = "Scales(radius=..., thickness=..., shear_modulus=...) is allowed"
         _check_interface("scales", self.scales, () if self.scales is None else ("to_si", "fits"), scales)
+        bending = switch("effects.bending", self.bending)
+        object.__setattr__(self, "_thickness_given", self.radius_to_thickness is not None or self.scales is not None)
         store(
             self,
+            bending=bending,
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
             loads=loads,
+            obstacles=obstacles,
             susceptibility=_susceptibility("membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=switch("effects.tension_field", self.tension_field),
@@ -188,6 +212,7 @@ class Scene:
         if self.tension_field and getattr(self.material, "prestressed", False):
             allowed = "false is allowed with a pre-stressed strain energy: its width without stress is not known"
             raise InputError("effects.tension_field", True, allowed)
+        self._check_bending()
         self._check_size()
         self._check_sheet()
         lift = lift_of(self.mesh, self.prestretch)  # refuses what cannot be stretched
@@ -195,6 +220,8 @@ class Scene:
         self._check_sources(lift)
         self._check_hubs()
         self._check_run()
+        if self.bodies:
+            check_obstacles(self, lift)
 
     def _check_run(self) -> None:
         """A run over a number has that number, and gas has its chamber."""
@@ -204,6 +231,19 @@ class Scene:
         gas = run is not None and (run.control == GAS or GAS in (run.hold or ()) or GAS in (run.until or ()))
         if self.chamber is None and (gas or GAS in self.analysis.stability):
             raise InputError("chamber", None, "missing; an amount of gas needs the volume of its chamber: give chamber.volume")
+
+    def _check_bending(self) -> None:
+        """Bending has the thickness it follows from, second derivatives, and a compression to act on."""
+        if not self.bending:
+            return
+        if not self._thickness_given:
+            message = "missing; bending follows from the thickness: give R0/T, or scales"
+            raise InputError("membrane.radius_to_thickness", None, message)
+        if self.tension_field:
+            allowed = "false is allowed with a tension field, which carries no compression that bending could resist"
+            raise InputError("effects.bending", True, allowed)
+        if not self.open and self.degree < 2:
+            raise InputError("mesh.degree", self.degree, "2 or more is allowed with bending: linear elements have no second derivatives")
 
     def _check_size(self) -> None:
         """Refuse a scene that the memory has no room for, before anything is built."""
@@ -254,7 +294,7 @@ class Scene:
             _check_interface(path, source, ("field", "jet", "intensity", "distance_squared", "passed", "meets", "sees", "refusal"), allowed)
             # a meridian meets the axis at its ends only, so that its breakpoints are enough; circles and bodies may lie between them
             with np.errstate(all="ignore"):
-                finite = all(np.all(np.isfinite(component)) for component in source.field(R, Z))
+                finite = all(np.all(np.isfinite(component)) for component in components(source, R, Z))
             touched = source.meets(R, Z)
             if touched or not finite:
                 name, reason = source.refusal
@@ -294,6 +334,12 @@ class Scene:
         return self.follow_zones and self.tension_field
 
     @property
+    def bodies(self) -> tuple[Obstacle, ...]:
+        """What the membrane cannot enter: the obstacles, and the bodies of sources that bring theirs."""
+        own = (getattr(source, "obstacle", None) for source in self.sources)
+        return (*self.obstacles, *(body for body in own if body is not None))
+
+    @property
     def element_ends(self) -> tuple[float, ...]:
         """Places along the meridian where elements end beside those of the mesh: jumps and kinks of the sheet, and ends of electrodes."""
         factors = (self.thickness, self.modulus, self.remanence)
@@ -325,6 +371,20 @@ class Scene:
             plain, start=None if plain.start == ends[0] else plain.start, stop=None if plain.stop == ends[1] else plain.stop
         )
 
+    def bordered(self, borders: tuple[tuple[int, float], ...]) -> Self:
+        """The same scene with some ends of its elements where contact begins or ends: a solver finds them, and nothing is checked.
+
+        Parameters
+        ----------
+        borders : tuple of (int, float)
+            Numbers of ends of elements, and their places along the meridian.
+        """
+        if borders == self.borders:
+            return self
+        made = object.__new__(type(self))
+        made.__dict__.update(self.__dict__, borders=borders)
+        return made
+
     def replace(self, **changes: Any) -> Self:
         """The same scene with some attributes changed, checked anew.
 
@@ -344,8 +404,10 @@ class Scene:
         for name, value in changes.items():
             if name not in known:
                 raise InputError(name, value, unknown_name(name, name, known).allowed)
-        if changes.get("scales") is not None:
+        if changes.get("scales") is not None or not self._thickness_given:  # a default is nothing that bending may follow from
             changes.setdefault("radius_to_thickness", None)
+        if changes.keys() & {"mesh", "degree", "thickness", "modulus", "remanence", "obstacles", "sources"}:
+            changes.setdefault("borders", ())
         if getattr(changes.get("mesh"), "open", False):
             changes.setdefault("degree", None)
         return dataclasses.replace(self, **changes)

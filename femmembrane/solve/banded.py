@@ -42,7 +42,7 @@ def negative_among(evaluation: Evaluation, constraint: Array | None = None) -> i
     """Number of negative eigenvalues of E'' - P V'' at a state, restricted to ``constraint . x = 0`` if one is given."""
     if constraint is None:
         return evaluation.negative
-    kd = evaluation.potential.space.half_bandwidth
+    kd, constraint = evaluation.potential.space.half_bandwidth, evaluation.reduced(constraint)
     if evaluation.spring is None:
         return negative_directions(evaluation.band, kd, constraint)
     return bordered_count(evaluation.band, kd, np.column_stack([evaluation.spring, constraint]), np.array([-1.0, 0.0]))

@@ -55,7 +55,7 @@ def direction_at(potential: Potential, x: Array, pressure: float) -> Direction |
     size = float(np.linalg.norm(border))
     if not (evaluation.finite and size > 0):
         return None
-    problem, factor = BranchProblem(potential), BandFactor(evaluation.band)
+    problem, factor = BranchProblem(potential), BandFactor.of(evaluation)
     # dV and dP vanish together at a cusp only: one of two sums of them is a row that no other tangent is orthogonal to
     row, end = border / size, 1.0
     with np.errstate(all="ignore"):

@@ -35,7 +35,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
     folds = FOLDS
 
     def __init__(self, potential: Potential) -> None:
-        self.potential, self.cornered = potential, potential.scene.tension_field
+        self.potential, self.cornered = potential, potential.scene.tension_field or bool(potential.obstacles)
         self._band, self._half_bandwidth = potential.arc_band, potential.space.half_bandwidth
 
     @property
@@ -58,11 +58,16 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def unit_point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose tangent is known up to its length."""
-        return self.point(state, tangent / self.norm(tangent), sigma)
+        if not self.potential.obstacles:
+            return self.point(state, tangent / self.norm(tangent), sigma)
+        carried = joined(state.evaluation.carried(tangent[:-1]), float(tangent[-1]))
+        length = self.norm(carried)
+        return replace(self.point(state, carried / length, sigma), own=tangent / length)
 
     def point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose unit tangent is known."""
-        return BranchPoint(state, joined(state.x, state.pressure), tangent, self.dual(tangent), sigma)
+        own = state.evaluation.brought(tangent) if self.potential.obstacles else None
+        return BranchPoint(state, joined(state.x, state.pressure), tangent, self.dual(tangent), sigma, own=own)
 
     def resolve(self, guess: Array, row: Array, near: BranchPoint) -> BranchPoint:
         # as good as round-off lets it be: the pressure of a fold is the last digit that tells its two sides apart
@@ -87,7 +92,10 @@ class BranchProblem(CurveProblem[BranchPoint]):
         """Of [K, -V'; tangent^T, tangent_P], whose determinant is det K (tangent_P + tangent^T K^-1 V')."""
         factor, row = point.state.factor, point.dual
         solved = factor.solve(point.state.evaluation.volume_gradient)
-        return factor.determinant_sign() * (1 if row[-1] + row[:-1] @ solved > 0 else -1)
+        return factor.determinant_sign() * (1 if row[-1] + point.state.evaluation.row(row[:-1]) @ solved > 0 else -1)
+
+    def stays(self, quantity: Followed, point: BranchPoint) -> bool:
+        return quantity == "center_height" and point.state.evaluation.holds(self.potential.space.pole)
 
     def forbids(self, before: BranchPoint, after: BranchPoint) -> bool:
         return self.potential.passed_source(before.state.x, after.state.x)
@@ -117,7 +125,7 @@ def oriented_point(potential: Potential, state: State, sigma: float, tangent: Ar
 def tangent_at(potential: Potential, state: State, neighbour: BranchPoint) -> BranchPoint:
     """Unit tangent at a state, oriented like that of a neighbouring point."""
     row = neighbour.dual
-    bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, row[:-1], float(row[-1]))
+    bordered = BorderedFactor(state.factor, -state.evaluation.volume_gradient, state.evaluation.row(row[:-1]), float(row[-1]))
     return unit_point(potential, state, neighbour.sigma, joined(*bordered.solve(np.zeros_like(state.x), 1.0)))
 
 

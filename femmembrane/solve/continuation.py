@@ -27,6 +27,8 @@ CORNER = 100.0
 ROUND_OFF = 1e-14
 #: times the error of a point that a prediction from the points before may miss
 _BOTH_ENDS = 10.0
+#: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
+_MOVING = 0.02
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ class BranchPoint:
         Unit derivative of z with respect to arc length, and the inner product with it as a row.
     sigma : float
         Arc length.
+    own : ndarray or None
+        The tangent on the mesh of the state, where that follows borders of contact.
     """
 
     state: State
@@ -75,6 +79,7 @@ class BranchPoint:
     tangent: Array
     dual: Array
     sigma: float
+    own: Array | None = field(default=None, kw_only=True)
     #: rates that were asked for, as two segments ask for those of the point between them
     _rates: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -91,8 +96,8 @@ class BranchPoint:
     def rate_of(self, controlled: Controlled) -> float:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
         state, n = self.state, len(self.state.x)
-        space = state.evaluation.potential.space
-        return controlled.rate(space, state.pressure, state.evaluation, self.tangent[:n], float(self.tangent[n]))
+        space, tangent = state.evaluation.potential.space, self.tangent if self.own is None else self.own
+        return controlled.rate(space, state.pressure, state.evaluation, tangent[:n], float(tangent[n]))
 
 
 Point = TypeVar("Point", bound=BranchPoint)
@@ -176,6 +181,10 @@ class CurveProblem(ABC, Generic[Point]):
         """The state at rest if it lies between two points and no corrector finds it."""
         return None
 
+    def stays(self, quantity: Followed, point: Point) -> bool:
+        """Whether a quantity cannot change at a point, so that its rate of zero is no fold."""
+        return False
+
     def place(self, point: Point) -> str:
         """Where a point is, for messages."""
         return f"V = {point.state.volume:.9g}, P = {point.state.pressure:.9g}"
@@ -243,6 +252,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     known = max(tracer.known, new.state.correction)
     if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
+    if new.own is not None:
+        miss = max(miss - _MOVING, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)

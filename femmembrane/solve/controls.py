@@ -17,7 +17,8 @@ import numpy as np
 
 from ..checks import choice, convert
 from ..discretization.space import Space
-from ..potential import Array, Evaluation
+from ..errors import InputError
+from ..potential import Array, Evaluation, Potential
 from ..quantities import heading
 from ..scene.run import MINIMISED, PRESCRIBED
 
@@ -213,6 +214,14 @@ class GasOver(Gas):
         return pressure + self.atmosphere if self.varies == "chamber" else volume + self.chamber
 
 
+def check_height(key: str, potential: Potential) -> None:
+    """Raise InputError where the height of the first point of the meridian is held, and cannot be prescribed."""
+    if potential.space.pole == potential.space.n_free:
+        raise InputError(
+            key, "a height", f"the first end of this {potential.scene.mesh.shape} is held along the axis; prescribe a volume or a pressure"
+        )
+
+
 def at_number(control: Control, number: float) -> Control:
     """A control at a value of the number of a family: only that of a gas may change with it.
 
@@ -240,6 +249,17 @@ class ArcLengthControl:
 
     def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
         value = self.dual.dot(x - self.prediction) + self.dual_pressure * (pressure - self.predicted_pressure)
+        return float(value), self.dual, self.dual_pressure
+
+
+@dataclass(slots=True, eq=False)
+class CarriedArcLength(ArcLengthControl):
+    """The same for displacements on another mesh: ``dual`` is of these, and ``offset`` what it is of the prediction."""
+
+    offset: float = 0.0
+
+    def equation(self, space: Space, x: Array, pressure: float, evaluation: Evaluation) -> tuple[float, Array, float]:
+        value = self.dual.dot(x) - self.offset + self.dual_pressure * (pressure - self.predicted_pressure)
         return float(value), self.dual, self.dual_pressure
 
 

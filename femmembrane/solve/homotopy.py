@@ -90,10 +90,10 @@ class Fields:
         self.potential, self.control = potential, control
 
     def at(self, x: Array, pressure: float, t: float) -> Residual:
-        evaluation, other = (self.potential.evaluate(x, pressure, factor) for factor in (t, t + 1.0))
+        evaluation = self.potential.evaluate(x, pressure, t)
         gap, row, corner = self.control.equation(self.potential.space, x, pressure, evaluation)
         force = evaluation.gradient - pressure * evaluation.volume_gradient
-        return Residual(evaluation, force, gap, row, corner, other.gradient - evaluation.gradient, 0.0)  # linear in the factor: exact
+        return Residual(evaluation, force, gap, row, corner, self.potential.factor_derivative(evaluation, pressure, t), 0.0)
 
     def solve(self, x: Array, pressure: float) -> NewtonResult:
         return correct(self.potential, self.control, x, pressure, damped=True)

@@ -19,7 +19,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import casadi as ca
 import numpy as np
@@ -27,6 +27,7 @@ import numpy as np
 from ..discretization.space import HESSIAN_PAIRS
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential
+from ..potential.contact import gap_rows
 from ..potential.expressions import BUILDING
 from ..potential.replay import vectorise
 from ..threads import Guard
@@ -34,6 +35,9 @@ from .banded import negative_among
 from .controls import Control, PressureControl, VolumeControl
 from .newton import NewtonResult, correct, displaced
 from .state import displacement, distance
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
 from .wellposed import stress_free
 
 #: two states closer than this are the same, relative to the size of the displacement
@@ -122,13 +126,18 @@ class _Solver:
     Threads may share one: calls are answered one at a time.
     """
 
-    def __init__(self, function: ca.Function) -> None:
+    def __init__(self, function: ca.Function, gaps: int = 0) -> None:
         n, m = function.numel_in(0), function.numel_out(2)
         self._lock = Guard()
         self._x, self._parameters = np.zeros(n), np.zeros(function.numel_in(1))
         self._target, self._multiplier = np.zeros(m), np.zeros(m)
         free = np.full(n, np.inf)
-        self._inputs = (self._x, self._parameters, -free, free, self._target, self._target, np.zeros(n), self._multiplier)
+        most = self._target
+        if gaps:  # the last rows, at least 0
+            self._most = np.full(m, np.inf)
+            most = self._most
+        self._gaps = gaps
+        self._inputs = (self._x, self._parameters, -free, free, self._target, most, np.zeros(n), self._multiplier)
         self._outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
         self._buffer, self._call = function.buffer()
         for k, array in enumerate(self._inputs):
@@ -142,10 +151,13 @@ class _Solver:
         """Minimiser, multipliers of the constraints, iterations and IPOPT's return status, from a guess with guesses of the multipliers."""
         with self._lock:
             self._x[:], self._parameters[:] = x, parameters
-            self._target[:], self._multiplier[:] = targets, multipliers
+            rows = len(self._target) - self._gaps
+            self._target[:rows], self._multiplier[:rows] = targets, multipliers
+            if self._gaps:
+                self._most[:rows] = targets
             self._call()
             stats = self._buffer.stats()
-            found, multiplier = self._outputs[0].copy(), self._outputs[4].copy()
+            found, multiplier = self._outputs[0].copy(), self._outputs[4][: len(self._target) - self._gaps].copy()
         return found, multiplier, int(stats.get("iter_count", 0)), str(stats["return_status"])
 
 
@@ -156,6 +168,8 @@ def _solver(potential: Potential, constrained: bool, max_iterations: int) -> _So
     y, p = ca.MX.sym("y", functions.value.numel_in(0)), ca.MX.sym("p", functions.value.numel_in(1))
     problem = {"x": y, "p": p, "f": functions.value(y, p)}
     options = _OPTIONS | {"grad_f": functions.gradient, "ipopt": _OPTIONS["ipopt"] | {"max_iter": max_iterations}}
+    if potential.obstacles:
+        return _solver_with_bodies(cast("ContactPotential", potential), functions, problem, options, constrained)
     charged = functions.charge is not None
     constraints = [functions.volume_gradient] if constrained else []
     if functions.charge is not None:
@@ -168,6 +182,25 @@ def _solver(potential: Potential, constrained: bool, max_iterations: int) -> _So
     second = functions.hessian(y, p, lam_f, lam_g[0] if constrained else 0.0)
     options["hess_lag"] = ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [second]) if charged or not constrained else functions.hessian
     return _Solver(ca.nlpsol("ipopt", "ipopt", problem, options))
+
+
+def _solver_with_bodies(
+    potential: ContactPotential, functions: NlpFunctions, problem: dict[str, Any], options: dict[str, Any], constrained: bool
+) -> _Solver:
+    """IPOPT with a gap >= 0 at every node, over the size of the membrane; the nodes of a guess are moved out of the bodies."""
+    y, p = problem["x"], problem["p"]
+    gaps = gap_rows(potential, y, p)
+    count = gaps.numel()
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", count + int(constrained))
+    first = lam_g[0] if constrained else 0.0
+    second, _ = ca.hessian(ca.dot(lam_g[int(constrained) :], gaps), y)
+    hessian = functions.hessian(y, p, lam_f, first) + ca.triu(second)
+    problem["g"] = ca.vertcat(functions.volume(y, p), gaps) if constrained else gaps
+    rows = [functions.volume_gradient(y, p)[1]] if constrained else []
+    options["ipopt"] = options["ipopt"] | {"bound_relax_factor": 0.0, "tol": 1e-11, "compl_inf_tol": 1e-11}
+    options["jac_g"] = ca.Function("nlp_jac_g", [y, p], [problem["g"], ca.vertcat(*rows, ca.jacobian(gaps, y))])
+    options["hess_lag"] = ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [hessian])
+    return _Solver(ca.nlpsol("ipopt", "ipopt", problem, options), count)
 
 
 def minimize_and_verify(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..errors import Status
 from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
+from .active_set import settled
 from .controls import ArcLengthControl, Control, VolumeControl
 
 #: relative size of the Newton correction at which a state counts as converged
@@ -35,6 +37,7 @@ PRESSURE = 1e-9
 class NewtonResult:
     """Where the corrector ended.
 
+    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders of contact where there are any, with ``bordered``.
     ``correction`` is the relative size of the Newton correction at x by ``bordered``, the last factors, at x or one correction before;
     ``residual`` and ``gap`` are evaluated at x.
     """
@@ -80,7 +83,24 @@ def correct(
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
         foretold from two corrections in quadratic convergence and confirmed by the residual at x and its correction by the factors before.
     """
-    x = np.ascontiguousarray(x, dtype=float)
+    once = partial(_corrected, magnetic=magnetic, damped=damped, tolerance=tolerance, max_iterations=max_iterations)
+    if potential.unsettled:
+        return settled(once, control, potential, x, pressure, magnetic)
+    return once(potential, control=control, x=x, pressure=pressure)
+
+
+def _corrected(
+    potential: Potential,
+    control: Control,
+    x: Array,
+    pressure: float,
+    magnetic: float,
+    damped: bool,
+    tolerance: float,
+    max_iterations: int,
+) -> NewtonResult:
+    """:func:`correct` on a potential that is smooth: that of a membrane without bodies, or on a set of nodes that bodies hold."""
+    x = potential.placed(np.ascontiguousarray(x, dtype=float))
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration, unbalance = np.inf, 0, np.inf
     while True:
@@ -101,6 +121,7 @@ def correct(
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
         x, pressure = (x + dx, pressure + dp) if length == 1 else (x + length * dx, pressure + length * dp)
+        x = potential.placed(x)
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
         # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, together
@@ -223,7 +244,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     # a component that is zero but for round-off, as along a tube that widens alone, has no size of its own
     units = [unit if unit > NEGLIGIBLE * max(units) else max(units) for unit in units]
     while length > 1e-4:
-        x, pressure = equations.x + length * dx, equations.pressure + length * dp
+        x, pressure = potential.placed(equations.x + length * dx), equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
         unbalanced = new.unbalanced
         if max(potential.largest(unbalanced)) < np.inf:

@@ -79,7 +79,7 @@ class Segment(Generic[Point]):
 
     def _folds_in(self, quantity: Followed) -> list[tuple[float, Located[Point]]]:
         """The folds in a quantity with their shares of the segment, located once."""
-        if self.leaving:
+        if self.leaving or any(self.problem.stays(quantity, point) for point in (self.a, self.b)):
             return []
         if quantity not in self._folds:
             kind = next((k for k, q in self.problem.folds.items() if q == quantity), "")

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import lru_cache
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -50,14 +52,34 @@ SAFE = 20.0
 HUGE = 1e12
 #: different states that the mesh does not resolve, after which no further way is tried; and how near they are if they are the same
 _COARSE, _SAME = 2, 1e-6
+#: times that a volume is divided by four until the membrane touches no body
+_QUARTERS = 60
 #: most steps along a branch in each direction, and corrections of a guess
 _STEPS, _CORRECTIONS = 300, 40
 
 
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
+
+
 def moderate(potential: Potential) -> float:
-    """By how much the volume of a moderately inflated membrane differs from that at rest."""
+    """By how much the volume of a moderately inflated membrane differs from that at rest; less where it would come to a body."""
     space = potential.space
-    return max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
+    size = max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
+    return free_volume(cast("ContactPotential", potential), size) if potential.obstacles else size
+
+
+@lru_cache(maxsize=16)
+def free_volume(potential: ContactPotential, size: float) -> float:
+    """The largest of a volume, a quarter of it and so on that a membrane without sources holds on either side of rest without touching a
+    body; at last the smallest."""
+    bare, rest = potential.without_bodies, potential.space.reference_volume
+    for _ in range(_QUARTERS):
+        with suppress(SolveError):
+            if all(potential.touching(_inflated(bare, rest + side * size).x) > 0 for side in (1.0, -1.0)):
+                break
+        size /= 4
+    return size
 
 
 def unloaded(potential: Potential) -> State | None:
@@ -261,6 +283,8 @@ def _inflated(potential: Potential, volume: float) -> State:
     if potential.space.loose:
         potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
     rest = potential.space.reference_volume
+    if potential.obstacles:
+        return _inflated_to_bodies(cast("ContactPotential", potential), volume)
     if volume == rest and not (potential.flat or potential.strained):
         return flat_state(potential, magnetic=0.0)
     if (drawn := unloaded(potential)) is not None and (state := _drawn_to(potential, drawn, volume)) is not None:
@@ -296,6 +320,29 @@ def _inflated(potential: Potential, volume: float) -> State:
     why = failure or "no guess led to an equilibrium"
     status = failure.status if failure else Status.NOT_CONVERGED
     raise SolveError(f"the membrane could not be inflated to V = {volume:.6g} without sources and loads: {why}", status=status)
+
+
+def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
+    """A membrane without sources and loads that came to a volume from where it touched no body."""
+    rest, bare = potential.space.reference_volume, potential.without_bodies
+    first = volume
+    for _ in range(_QUARTERS):
+        state = None
+        with suppress(SolveError):
+            state = _inflated(bare, first)
+        if state is not None and potential.touching(state.x) > 0:
+            break
+        if first == rest:
+            raise SolveError("the membrane without load touches a body", status=Status.NO_EQUILIBRIUM)
+        first = rest + (first - rest) / 4
+    else:
+        raise SolveError("no inflated membrane was found that touches no body", status=Status.NO_EQUILIBRIUM)
+    control = VolumeControl(first)
+    result = correct(potential, control, state.x, state.pressure, magnetic=0.0)
+    if result.status is not Status.CONVERGED:
+        raise SolveError(f"the membrane that touches no body at V = {first:.6g} was not found again", status=result.status)
+    found = State.of(result, state.iterations)
+    return found if first == volume else march(potential, found, VolumeControl, first, volume, magnetic=0.0)[-1]
 
 
 def _drawn_to(potential: Potential, drawn: State, volume: float) -> State | None:
@@ -414,6 +461,8 @@ def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
     if at_rest(potential, CONTROLS["center_height"], height):
         return flat_state(potential)
+    if potential.space.on_axis[0] and any(float(body.gap(0.0, height)[0]) < 0 for body in potential.obstacles):
+        raise SolveError(f"a pole at the height {height:.6g} would be inside a body", status=Status.NO_EQUILIBRIUM)
     sides = _sides(height - potential.space.first_height * (not potential.flat))
     size = moderate(potential)
     if potential.flat and not potential.surrounded:  # a branch leads past the flat membrane, which has no stiffness, nowhere near it
@@ -546,7 +595,7 @@ def _same(a: State, b: State) -> bool:
 
 def _sound(state: State) -> bool:
     """Whether a state is that of a membrane: well-posed, and not one of its mesh only."""
-    return _well_posed(state) and not unresolved(state.evaluation.potential, state)
+    return _well_posed(state) and not unresolved(state.evaluation.potential.root, state)
 
 
 def _is_minimum(state: State) -> bool:

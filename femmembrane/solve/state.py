@@ -18,6 +18,7 @@ from .newton import NewtonResult, correct
 class State:
     """An equilibrium as the solvers see it: unknowns, and the evaluation there.
 
+    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders of contact where there are any.
     ``correction`` is the relative size of the Newton correction at x, ``gap`` the error of the control equation there.
     """
 

@@ -73,7 +73,7 @@ def march(
     path = Predictor() if path is None else path
     factor_of = (lambda value: magnetic) if parameter == "load" else (lambda value: value)
     if not path.sigma:
-        path.append(start, joined(state.x, state.pressure), joined(*_slope(potential, state, control_at(start), parameter, start)))
+        path.append(start, joined(state.x, state.pressure), _carried_slope(potential, state, control_at(start), parameter, start))
     accepted = [state]
     here, step = start, stop - start
     spent = 0
@@ -93,7 +93,7 @@ def march(
             if _through_source(potential, accepted[-1], new, parameter):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"
                 raise SolveError(message, status=Status.DIPOLE_CONTACT, result=accepted)
-            path.append(there, joined(new.x, new.pressure), joined(*_slope(potential, new, control_at(there), parameter, there)))
+            path.append(there, joined(new.x, new.pressure), _carried_slope(potential, new, control_at(there), parameter, there))
             accepted.append(new)
             here, spent = there, 0
             step *= 2
@@ -132,6 +132,12 @@ def control_rate(family: Family, control: Control, x: Array, pressure: float, ev
     return rate
 
 
+def _carried_slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> Array:
+    """:func:`_slope` on the mesh of the scene, as one vector."""
+    dx, dp = _slope(potential, state, control, parameter, value)
+    return joined(state.evaluation.carried(dx), dp)
+
+
 def _slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> tuple[Array, float]:
     """Derivative of (x, P) with respect to the parameter."""
     space, evaluation = potential.space, state.evaluation
@@ -142,5 +148,4 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     if parameter == "number" and isinstance(potential, Family):
         rate = control_rate(potential, control, state.x, state.pressure, evaluation)
         return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)
-    other = potential.evaluate(state.x, state.pressure, value + 1.0)  # the gradient is linear in the factor: an exact derivative
-    return bordered.solve(evaluation.gradient - other.gradient, 0.0)
+    return bordered.solve(-evaluation.potential.factor_derivative(evaluation, state.pressure, value), 0.0)

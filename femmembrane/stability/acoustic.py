@@ -8,6 +8,7 @@ the strain energy alone has K_nunu = s_1 M_1^2 + s_2 M_2^2, and no coupling of n
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..potential import Array, Evaluation
 from ..solve.wellposed import supporting
@@ -40,6 +41,19 @@ def supporting_all(evaluation: Evaluation) -> Array:
     return np.stack([stresses[0], (hoop / thickness).ravel()])
 
 
+def elliptic_in_plane(evaluation: Evaluation) -> NDArray[np.bool_]:
+    """Whether the sheet has stiffness in its plane against waves of every direction, where an energy depends on the slope."""
+    space = evaluation.potential.space
+    r = response_at_quadrature(evaluation.potential, np.asarray(evaluation.x, dtype=float).tobytes())
+    moduli = _gradient_moduli(r)
+    stretches = np.hypot(r.rho_x, r.eta_x) / np.hypot(space.R_x, space.Z_x), r.rho / space.R
+    positive = np.ones(r.rho.shape, dtype=bool)
+    for angle in (0.0, *_OBLIQUE, np.pi / 2):
+        K = _acoustic(moduli, stretches, angle)
+        positive &= (K[0, 0] > 0) & (K[0, 0] * K[1, 1] > K[0, 1] ** 2)
+    return positive
+
+
 def _gradient_moduli(r: LocalResponse) -> Array:
     """Second derivatives with respect to (g1t, g1th, g1nu, g2t, g2th, g2nu), shape (6, 6, ...)."""
     moduli = np.zeros((6, 6, *r.rho.shape))
@@ -66,11 +80,17 @@ def _gradient_moduli(r: LocalResponse) -> Array:
     return moduli
 
 
-def _left(moduli: Array, stretches: tuple[Array, Array], angle: float) -> Array:
-    """What is left of K_nunu at M = (cos, sin) of an angle; negative too where the sheet is not elliptic in itself."""
+def _acoustic(moduli: Array, stretches: tuple[Array, Array], angle: float) -> Array:
+    """K(m) at M = (cos, sin) of an angle, shape (3, 3, ...)."""
     m = np.array([np.cos(angle) * stretches[0], np.sin(angle) * stretches[1]])
     blocks = moduli.reshape(2, 3, 2, 3, *moduli.shape[2:])
-    K = np.einsum("a...,aibj...,b...->ij...", m, blocks, m)
+    K: Array = np.einsum("a...,aibj...,b...->ij...", m, blocks, m)
+    return K
+
+
+def _left(moduli: Array, stretches: tuple[Array, Array], angle: float) -> Array:
+    """What is left of K_nunu at M = (cos, sin) of an angle; negative too where the sheet is not elliptic in itself."""
+    K = _acoustic(moduli, stretches, angle)
     determinant = K[0, 0] * K[1, 1] - K[0, 1] ** 2
     elliptic = (K[0, 0] > 0) & (determinant > 0)
     coupled = K[1, 1] * K[0, 2] ** 2 - 2 * K[0, 1] * K[0, 2] * K[1, 2] + K[0, 0] * K[1, 2] ** 2

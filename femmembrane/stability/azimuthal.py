@@ -6,10 +6,11 @@ ever lower eigenvalues, and none is the lowest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import choice, whole
 from ..discretization.space import Space
@@ -19,13 +20,17 @@ from ..results.verdict import Verdict
 from ..solve.pull_in import shears_in
 from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
-from .acoustic import supporting_all
+from .acoustic import elliptic_in_plane, supporting_all
 from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
-from .mode_resolution import unresolved, unresolved_stress
+from .bending import Bending
+from .mode_resolution import unresolved, unresolved_bending, unresolved_stress
 from .second_variation import pairs_of
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
 from .verdict import against, short_wave_verdict, slack_all_over, slack_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
+
+#: smallest eigenvalue at a located onset, over the terms that cancel in it
+_AT_ONSET = 1e-5
 
 
 @one_thread
@@ -46,7 +51,25 @@ def _smallest(operator: AzimuthalOperator, guess: Array | None) -> SmallestEigen
     if not operator.band.shape[1]:
         raise InputError("mesh.elements", 1, "one linear element has no unknowns with waves around the axis; two, or degree 2, are allowed")
     pencil = operator.pencil()
-    return smallest_of(pencil, pencil.block_iterations() if guess is None else guess)
+    found = smallest_of(pencil, pencil.block_iterations() if guess is None else operator.reduced(guess))
+    return found if operator.reduction is None else replace(found, mode=operator.expanded(found.mode))
+
+
+def onset_mode(potential: Potential, x: Array, pressure: float, n: int) -> tuple[NDArray[np.int64], Array]:
+    """The numbers of (a, c, b) at the nodes, and the coefficients of the mode with n waves around the axis that sets in at a state.
+
+    Raises
+    ------
+    InputError
+        Where none sets in.
+    SpectrumError
+    """
+    operator = azimuthal_operator(potential, x, pressure, n)
+    found = _smallest(operator, None)
+    if not abs(found.value) <= _AT_ONSET * operator.pencil().noise(found.mode)[0]:
+        message = f"states with {n} wave(s) around the axis are not computed from there, where none set in: the smallest eigenvalue is"
+        raise InputError("start", "azimuthal_onset", f"{message} {found.value:.3g}; a special point of a branch of this scene is allowed")
+    return operator.numbering, found.mode
 
 
 @one_thread
@@ -80,7 +103,7 @@ def lowest_eigenvalues(
     operator = azimuthal_operator(potential, x, pressure, n)
     size = operator.band.shape[1]
     count = whole("count", count, most=size - 2)
-    constraint = potential.evaluate(x, pressure).volume_gradient if n == 0 and control == "volume" else None
+    constraint = operator.reduced(potential.evaluate(x, pressure).volume_gradient) if n == 0 and control == "volume" else None
     return [(value, mode) for value, mode, _ in lowest_of(operator.pencil(constraint), count)]
 
 
@@ -103,7 +126,7 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     check_waves(n, 1)
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(np.asarray(x, dtype=float), pressure)
-    wrinkles = short_waves(potential, evaluation)
+    wrinkles = short_waves(potential, evaluation, operator.bending)
     if wrinkles and slack_all_over(evaluation):
         return slack_verdict(None, operator.n)
     if wrinkles:
@@ -112,9 +135,20 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     found = _smallest(operator, guess)
     shape = partial(azimuthal_shape, potential.space, operator.n)
     # compression that is the mesh's alone says that the mesh is not to be trusted
-    false = not potential.scene.tension_field and any(least_stress(evaluation, component, supporting_all) for component in (0, 1))
+    sharp = not potential.scene.tension_field and operator.bending is None
+    false = sharp and any(least_stress(evaluation, component, supporting_all) for component in (0, 1))
     part = np.inf if false else _unresolved(potential.space, operator, found.mode)
-    return verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
+    verdict = verdict_from(found, against(None, operator.n), None, operator.n, shape, part)
+    return verdict if operator.bending is None else replace(verdict, wavelength=_wavelength(operator, found.mode))
+
+
+def _wavelength(operator: AzimuthalOperator, mode: Array) -> float:
+    """The length of a wave on the circle where the normal displacement of a mode is largest, as deformed."""
+    r = operator.response
+    local = wave_unknowns(operator.space, min(operator.n, 2)).local(mode).reshape(3, operator.space.degree + 1, -1)
+    a, _, b = operator.space.shape_functions(operator.space.points)[0] @ local
+    largest = np.argmax(np.abs(r.t_rho * b - r.t_z * a))
+    return float(2 * np.pi * r.rho.ravel()[largest] / operator.n)
 
 
 def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float:
@@ -123,7 +157,9 @@ def _unresolved(space: Space, operator: AzimuthalOperator, mode: Array) -> float
     local = space.table[: 2 * space.n_quadrature, : space.degree + 1] @ layout.local(mode).reshape(3, space.degree + 1, -1)
     local = local.reshape(6, *space.R.shape)
     stress = np.stack([operator.response.s1, operator.response.s2])
-    return unresolved(space, operator.density, pairs_of(operator.density), local, unresolved_stress(space, stress))
+    of_state = unresolved_stress(space, stress)
+    part = unresolved(space, operator.density, pairs_of(operator.density), local, of_state)
+    return part if operator.bending is None else part + unresolved_bending(space, *operator.bending.densities(mode), of_state)
 
 
 @dataclass(frozen=True)
@@ -134,13 +170,16 @@ class ShortWaves:
     confirmed: bool
 
 
-def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves]:
+def short_waves(potential: Potential, evaluation: Evaluation, bending: Bending | None = None) -> list[ShortWaves]:
     """Where ever shorter waves with n >= 1 waves around the axis have ever lower eigenvalues; empty if nowhere.
 
     A principal mechanical stress is compressive, or does not hold the sheet against a field that turns it, so that the Legendre-Hadamard
     condition fails. In a tension field no stress is compressive. There the meridional stress may vanish; without hoop stress the operator
-    of one n is as good as any.
+    of one n is as good as any. Bending puts an end to waves out of the surface, and leaves those in the plane of the sheet, of which a
+    stress says nothing.
     """
+    if bending is not None and bending.positive:
+        return _in_plane(potential, evaluation)
     if potential.scene.tension_field:
         bad = ill_posed(potential, evaluation)
         return [] if bad is None else [ShortWaves(str(bad), bad.confirmed)]
@@ -154,7 +193,13 @@ def short_waves(potential: Potential, evaluation: Evaluation) -> list[ShortWaves
                 continue
             what = f"{name} stress not held against the field" if zone.turned else f"{name} stress compressive"
             found.append(ShortWaves(f"{what} at {zone.where}{doubt}: wrinkles along {lines}", zone.confirmed))
+    return found or _in_plane(potential, evaluation)
+
+
+def _in_plane(potential: Potential, evaluation: Evaluation) -> list[ShortWaves]:
+    """Where a field takes the stiffness of the sheet in its plane."""
     pulled = shears_in(potential, evaluation)
-    if pulled.size and not found:
-        found.append(ShortWaves(f"the field leaves no stiffness in the plane at {interval(pulled.min(), pulled.max())}", True))
-    return found
+    if not pulled.size and potential.tilts:
+        pulled = potential.space.R[~elliptic_in_plane(evaluation)]
+    where = "the field leaves no stiffness in the plane at "
+    return [ShortWaves(where + interval(float(pulled.min()), float(pulled.max())), True)] if pulled.size else []

@@ -6,18 +6,25 @@ Rigid motions that the supports leave are taken out, and of a sphere the motion 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import whole
+from ..discretization.harmonics import AROUND, RADIAL, VERTICAL
 from ..discretization.space import Space
 from ..potential import Array, Potential
+from ..potential.contact import Reduction
+from .bending import Bending, bending_form, widened
 from .mode_resolution import small_eigenvalue
 from .rigid_motions import pencil_of, rigid_part
 from .second_variation import LocalResponse, response_at_quadrature, second_variation
 from .spectrum import Pencil
-from .wave_unknowns import RADIAL, VERTICAL, WaveUnknowns, azimuthal_shape, wave_unknowns
+from .wave_unknowns import WaveUnknowns, azimuthal_shape, wave_unknowns
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactEvaluation, ContactPotential
 
 #: departure from a rigid motion, relative to its size, below which the turned material of a sphere has only turned as a whole
 _ROUND = 1e-6
@@ -34,14 +41,14 @@ class AzimuthalOperator:
     band, mass : ndarray, shape (3 kd + 1, n_free)
         In LAPACK general band storage.
     half_bandwidth : int
-        kd = 3 degree + 2 (2 degree + 1 for n = 0).
+        kd = 3 degree + 2 (2 degree + 1 for n = 0), and about twice that with bending.
     numbering : ndarray of int, shape (n_nodes, 3)
         Unknown of (a, c, b) at each node along the meridian; n_free stands for what is held. On the axis at n = 1, c = -a share one.
     n : int
     response : LocalResponse
         At the quadrature points, shape (n_quadrature, n_elements).
     density : ndarray, shape (18 or 19, n_quadrature, n_elements)
-        What ``band`` integrates: second derivatives of the quadratic form at the points, times the weights, in the order of
+        What ``band`` integrates beside bending: second derivatives of the quadratic form at the points, times the weights, in the order of
         :func:`.second_variation.pairs_of`.
     rigid : ndarray, shape (n_free, k), or None
         Motions of the membrane as a whole that nothing resists, see :mod:`.rigid_motions`.
@@ -49,6 +56,10 @@ class AzimuthalOperator:
         The mass times the motion of the material in itself that costs nothing, see :func:`_spin`: perturbations are orthogonal to it.
     spring : ndarray, shape (n_free,), or None
         Of a total charge at n = 0, see :class:`.Evaluation`; waves do not change the capacitance to first order.
+    bending : Bending or None
+        What the bending of the sheet adds, where the scene has it.
+    reduction : Reduction or None
+        Where bodies hold nodes: ``band``, ``mass``, ``rigid`` and ``spin`` are without the normal displacements of these.
     """
 
     band: Array
@@ -62,6 +73,16 @@ class AzimuthalOperator:
     rigid: Array | None = None
     spin: Array | None = None
     spring: Array | None = None
+    bending: Bending | None = None
+    reduction: Reduction | None = None
+
+    def reduced(self, v: Array) -> Array:
+        """A vector in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
+        return v if self.reduction is None else self.reduction.reduced(v)
+
+    def expanded(self, v: Array) -> Array:
+        """The coefficients of (a, c, b) of a vector in the unknowns of :attr:`band`."""
+        return v if self.reduction is None else self.reduction.expanded(v)
 
     def pencil(self, constraint: Array | None = None) -> Pencil:
         """K - lambda M, motions that cost nothing taken out."""
@@ -70,7 +91,7 @@ class AzimuthalOperator:
 
     def shape(self, mode: Array) -> dict[str, Array]:
         """A mode at the nodes, see :func:`azimuthal_shape`."""
-        return azimuthal_shape(self.space, self.n, mode)
+        return azimuthal_shape(self.space, self.n, self.expanded(mode))
 
 
 def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) -> AzimuthalOperator:
@@ -112,7 +133,50 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     uniform = potential.sheet is None and potential.electrode is None
     if n == 1 and space.spins and uniform and turns:
         spin = _spin(space, layout, response, motions, pencil_of(band, mass, layout.half_bandwidth, None, 0.0, rigid))
-    return AzimuthalOperator(band, mass, layout.half_bandwidth, layout.numbers, int(n), response, space, density, rigid, spin, spring)
+    kd, form = layout.half_bandwidth, bending_form(potential, x)
+    bending = None if form is None else form.at(int(n))
+    if bending is not None:
+        band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
+    reduction = None
+    if potential.obstacles:  # a scene has bodies or bending
+        band, reduction = _against_bodies(potential, x, pressure, layout, band)
+    if reduction is not None:
+        lightest = np.full(reduction.out.shape, np.abs(mass[2 * kd]).min())
+        mass = reduction.band(mass, kd, lightest)
+        rigid, spin = (None if part is None else reduction.reduced(part) for part in (rigid, spin))
+    return AzimuthalOperator(
+        band, mass, kd, layout.numbers, int(n), response, space, density, rigid, spin, spring, bending=bending, reduction=reduction
+    )
+
+
+def _against_bodies(potential: Potential, x: Array, pressure: float, layout: WaveUnknowns, band: Array) -> tuple[Array, Reduction | None]:
+    """The matrix with what bodies add and take, and who takes vectors there; unchanged and None where none is touched.
+
+    A body of which a node keeps the distance 0 leaves it the tangential displacement and the one around the axis. The force that it pushes
+    with works on their squares, by the curvatures of the body.
+    """
+    evaluation = cast("ContactEvaluation", potential.evaluate(np.asarray(x, dtype=float), pressure))
+    held, gaps, n = evaluation.held, evaluation.gaps, layout.n_free
+    if not held.any():
+        return band, None
+    own, kd = cast("ContactPotential", potential), layout.half_bandwidth
+    numbers = layout.numbers[potential.space.nodes[own.nodes[held]]]
+    a, c, b = (numbers[:, k] for k in (RADIAL, AROUND, VERTICAL))
+    n_rho, n_eta, force = gaps.n_rho[held], gaps.n_eta[held], evaluation.forces[held]
+    band = band.copy(order="F")
+    for i, j, work in (
+        (a, a, gaps.curvature[held] * n_eta**2),
+        (b, b, gaps.curvature[held] * n_rho**2),
+        (a, b, -gaps.curvature[held] * n_rho * n_eta),
+        (b, a, -gaps.curvature[held] * n_rho * n_eta),
+        (c, c, gaps.circle[held]),
+    ):
+        both = (i < n) & (j < n)
+        np.add.at(band, (2 * kd + (i - j)[both], j[both]), -(force * work)[both])
+    able = (np.where(a < n, np.abs(n_rho), 0.0) > 1e-6) | (np.where(b < n, np.abs(n_eta), 0.0) > 1e-6)
+    a, b, n_rho, n_eta = a[able], b[able], n_rho[able], n_eta[able]
+    reduction = Reduction(a, b, n_rho, n_eta, n)
+    return reduction.band(band, kd), reduction
 
 
 def _products(first: Array, second: Array, area: Array) -> Array:

@@ -12,13 +12,14 @@ from ..checks import whole
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Verdict
-from ..scene import MAX_WAVES
+from ..scene import ALL, MAX_WAVES
 from ..solve.finer_space import counterpart, transferred
 from .azimuthal import azimuthal_verdict
 from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError
 from .verdict import CONTROLS, against, axisymmetric_verdict, in_words
 from .wave_unknowns import mode_in
+from .worst_waves import worst_waves
 
 #: an eigenvalue this many times the part of it that the mesh does not resolve has a sign that is believed at once
 _CLEAR = 2.0
@@ -39,18 +40,21 @@ def checked_verdict(
     pressure: float,
     evaluation: Evaluation,
     control: str | None,
-    azimuthal: int,
+    azimuthal: int | str,
     *,
     guess: Array | None = None,
     compliance: float | None = None,
 ) -> Verdict:
-    """Verdict on a state against axisymmetric perturbations under a control, or against n >= 1 waves around the axis.
+    """Verdict on a state against axisymmetric perturbations under a control, or against n >= 1 waves around the axis; with "all" against
+    the number of waves that has the lowest eigenvalue, see :mod:`.worst_waves`.
 
     Raises
     ------
     InputError
         When neither or both of control and azimuthal are given, or one is unknown.
     """
+    if azimuthal == ALL:
+        return _worst_verdict(potential, x, pressure, evaluation, control)
     azimuthal = whole("azimuthal", azimuthal, least=0, most=MAX_WAVES)
     if azimuthal and control is not None:
         raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
@@ -67,6 +71,19 @@ def checked_verdict(
         if np.isinf(verdict._unresolved):
             verdict = replace(verdict, reason=f"{verdict.reason}; {_FALSE}")
     return verdict
+
+
+def _worst_verdict(potential: Potential, x: Array, pressure: float, evaluation: Evaluation, control: str | None) -> Verdict:
+    first = checked_verdict(potential, x, pressure, evaluation, control, 1)
+    if first.coefficients is None:  # shorter waves are worse without end, or nothing can be said
+        return first
+    try:
+        n, limit = worst_waves(potential, x, pressure, evaluation)
+    except SpectrumError as error:
+        return Verdict(None, np.nan, np.nan, control, 1, None, f"not decided: {error}")
+    verdict = first if n == 1 else checked_verdict(potential, x, pressure, evaluation, control, n)
+    found = f"n = {n} has the lowest eigenvalue found among 1 to {limit} waves; with more, tension and bending outweigh what drives them"
+    return replace(verdict, reason=f"{verdict.reason}; {found}")
 
 
 def _verdict(
@@ -133,7 +150,7 @@ def _finer_verdict(
         return None
     finer = found.evaluation.potential
     try:
-        better = ask(finer, found.x, found.pressure, found.evaluation)
+        better = ask(finer, found.evaluation.x, found.pressure, found.evaluation)
     except SpectrumError:
         return None
     if better.coefficients is None:

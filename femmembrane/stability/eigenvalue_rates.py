@@ -18,9 +18,9 @@ from ..scene import MAX_WAVES, Scene
 from ..solve.sensitivity import Rates, Sensitive, differentiated
 from .azimuthal import azimuthal_verdict
 from .azimuthal_operator import azimuthal_operator
-from .rigid_motions import pencil_of
+from .bending import bending_form
 from .spectrum import Pencil
-from .verdict import CONTROLS, axisymmetric_verdict
+from .verdict import CONTROLS, axisymmetric_pencil, axisymmetric_verdict
 
 if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
@@ -89,8 +89,8 @@ def eigenvalue_rates(
         push = rates.pressure + known.through("chamber.atmosphere")
         total, absolute = eq.volume + gas.chamber, eq.pressure + gas.atmosphere
         extra = -((along / compliance) ** 2) * (room / absolute - total / absolute**2 * push)
-    if evaluation.spring is not None:
-        return extra + _sprung(mode, q, verdict, known, moved, step)
+    if evaluation.spring is not None or eq.scene.bending:
+        return extra + _by_differences(mode, q, verdict, known, moved, step)
     state, pressure, numbers = known.form(eq.state, eq.pressure, mode, q)
     return extra + state @ rates.x + pressure * rates.pressure + numbers
 
@@ -109,8 +109,8 @@ def require_simple(pencil: Pencil, verdict: Verdict) -> None:
 
 def _pencil(potential: Potential, evaluation: Evaluation, control: str | None, compliance: float | None) -> Pencil:
     constraint = None if control == "pressure" else evaluation.volume_gradient
-    half = potential.space.half_bandwidth
-    return pencil_of(evaluation.band, potential.mass, half, constraint, compliance or 0.0, potential.rigid, evaluation.spring)
+    form = bending_form(potential, evaluation.x)
+    return axisymmetric_pencil(potential, evaluation, None if form is None else form.at(0), constraint, compliance or 0.0)
 
 
 def _normal(pencil: Pencil, verdict: Verdict) -> Array:
@@ -136,12 +136,14 @@ def _differences(
     return np.array([float(differentiated(lambda t, k=k: form(k, t), step(k))) for k in range(len(known.names))])  # type: ignore[misc]
 
 
-def _sprung(mode: Array, q: float, verdict: Verdict, known: Sensitive, moved: Moved, step: Callable[[int], float]) -> Array:
-    """With a total charge: of phi.K phi - 2 q V'.phi at the fixed mode."""
+def _by_differences(mode: Array, q: float, verdict: Verdict, known: Sensitive, moved: Moved, step: Callable[[int], float]) -> Array:
+    """With a total charge or bending: of phi.K phi - 2 q V'.phi at the fixed mode."""
 
     def form(k: int, t: float) -> Array:
         scene, x, pressure = moved(k, t)
-        evaluation = potential_of(scene).evaluate(x, pressure)
-        return np.array(evaluation.inner(mode, mode) - 2 * q * float(evaluation.volume_gradient @ mode))
+        potential = potential_of(scene)
+        evaluation, bending = potential.evaluate(x, pressure), bending_form(potential, x)
+        bent = 0.0 if bending is None else bending.at(0).energy(mode)
+        return np.array(evaluation.inner(mode, mode) + bent - 2 * q * float(evaluation.volume_gradient @ mode))
 
     return np.array([float(differentiated(lambda t, k=k: form(k, t), step(k))) for k in range(len(known.names))])  # type: ignore[misc]

@@ -17,11 +17,10 @@ from functools import partial
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from ..results.vibration import Vibration
-from ..solve.wellposed import ill_posed
 from .azimuthal import lowest_eigenvalues, short_waves
 from .azimuthal_operator import azimuthal_operator
 from .spectrum import SpectrumError
-from .verdict import SLACK_ALL_OVER, slack_all_over
+from .verdict import SLACK_ALL_OVER, slack_all_over, unbounded_below
 from .wave_unknowns import azimuthal_shape
 
 
@@ -53,9 +52,11 @@ def natural_frequencies(
     """
     operator = azimuthal_operator(potential, x, pressure, n)
     evaluation = potential.evaluate(x, pressure)
-    bad = ill_posed(potential, evaluation)
+    bad = unbounded_below(potential, evaluation, operator.bending)
     # a hoop stress sets no axisymmetric wave in motion
-    wrinkles = [wrinkle.where for wrinkle in short_waves(potential, evaluation)] if operator.n else [str(bad)] if bad else []
+    wrinkles = (
+        [wrinkle.where for wrinkle in short_waves(potential, evaluation, operator.bending)] if operator.n else [str(bad)] if bad else []
+    )
     if wrinkles and slack_all_over(evaluation):
         raise SolveError(f"no natural frequencies: {SLACK_ALL_OVER}", status=Status.SLACK)
     if wrinkles:
@@ -65,12 +66,13 @@ def natural_frequencies(
         found = lowest_eigenvalues(potential, x, pressure, n, count, control)
     except SpectrumError as error:
         raise SolveError(f"no natural frequencies: {error}", status=Status.NOT_CONVERGED) from error
-    constraint = evaluation.volume_gradient if n == 0 and control == "volume" else None
+    constraint = operator.reduced(evaluation.volume_gradient) if n == 0 and control == "volume" else None
     pencil = operator.pencil(constraint)
     shape = partial(_shape_at_nodes, potential, operator.n)
     vibrations = []
     for _, mode in found:
         value, error_bound = pencil.quotient(mode, pencil.times_mass(mode))
+        mode = operator.expanded(mode)
         mode.flags.writeable = False
         vibrations.append(Vibration(value, error_bound, operator.n, None if n else control, mode, shape))
     return tuple(vibrations)

@@ -152,6 +152,8 @@ def jacobi_test(equilibrium: Equilibrium, form: str = "corrected", *, start: flo
     choice("form", form, FORMS)
     if not 0 < start <= 0.01:
         raise InputError("start", start, "a radius in (0, 0.01] is allowed")
+    if equilibrium.scene.bodies:
+        raise InputError("obstacle", equilibrium.scene.bodies[0].label(), "none is allowed: the test is written for a free membrane")
     if equilibrium.scene.mesh.shape != "disc":
         raise InputError("mesh.shape", equilibrium.scene.mesh.shape, '"disc" is allowed: the test is written for a pole and a clamped rim')
     if not legendre_test(equilibrium).satisfied:

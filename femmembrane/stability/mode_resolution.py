@@ -17,6 +17,7 @@ from scipy.linalg import blas
 from ..discretization.space import Space
 from ..kernels.numpy_kernels import form_parts
 from ..potential import Array, Evaluation
+from .bending import Bending
 
 #: an eigenvalue is small below this part of a typical one: about the eigenvalue of a membrane of the same area under a tension of one shear
 #: modulus
@@ -46,6 +47,11 @@ def unresolved(space: Space, density: Array, pairs: tuple[tuple[int, int], ...],
     return along + of_state * terms
 
 
+def unresolved_bending(space: Space, inside: Array, joints: float, of_state: float) -> float:
+    """The same of the bending of a mode, from its energies at the points and at the joints: a mode that is resolved does not jump."""
+    return _size(space.highest @ inside) + joints + of_state * _size(inside)
+
+
 def unresolved_stress(space: Space, stress: Array) -> float:
     """Relative part of the stresses of a state that the mesh does not resolve. Errors of the pressure and of moduli are smaller."""
     integrand = (stress[0] + stress[1]).reshape(space.R.shape)
@@ -59,10 +65,12 @@ def _size(values: Array) -> float:
     return float(blas.dasum(values.ravel()))
 
 
-def unresolved_axisymmetric(evaluation: Evaluation, mode: Array) -> float:
+def unresolved_axisymmetric(evaluation: Evaluation, mode: Array, bending: Bending | None = None) -> float:
     """:func:`unresolved` for an axisymmetric mode."""
     along, terms = evaluation.form_parts(mode)
-    return along + evaluation.once("unresolved stress", _of_state) * terms
+    of_state = evaluation.once("unresolved stress", _of_state)
+    part = along + of_state * terms
+    return part if bending is None else part + unresolved_bending(evaluation.potential.space, *bending.densities(mode), of_state)
 
 
 def _of_state(evaluation: Evaluation) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,10 +13,11 @@ from ..errors import InputError
 from ..physics.electric import Electric
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Shape, Verdict
-from ..solve.wellposed import apparent, ill_posed, stress_free
+from ..solve.wellposed import IllPosed, apparent, ill_posed, stress_free
+from .bending import Bending, bending_form, widened
 from .mode_resolution import unresolved_axisymmetric
 from .rigid_motions import pencil_of
-from .spectrum import SmallestEigenvalue, smallest_of
+from .spectrum import Pencil, SmallestEigenvalue, smallest_of
 
 CONTROLS = ("pressure", "volume", "gas")
 #: what is said of a membrane without any tension
@@ -39,8 +41,10 @@ def axisymmetric_verdict(
         For an unknown control, or "gas" without the gas.
     """
     choice("control", control, CONTROLS)
-    shown = apparent(potential, evaluation)
-    bad = ill_posed(potential, evaluation) if shown else None
+    form = bending_form(potential, evaluation.x)
+    bending = None if form is None else form.at(0)
+    shown = None if bending is not None and bending.positive else apparent(potential, evaluation)
+    bad = unbounded_below(potential, evaluation, bending)
     if bad is not None and slack_all_over(evaluation):
         return slack_verdict(control, 0)
     if bad is not None:
@@ -49,14 +53,64 @@ def axisymmetric_verdict(
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
-    found = smallest_of(
-        pencil_of(evaluation.band, potential.mass, potential.space.half_bandwidth, constraint, soft, potential.rigid, evaluation.spring),
-        guess,
-    )
+    found = _smallest(potential, evaluation, bending, constraint, soft, guess)
+    if (free := evaluation.released()) is not None:
+        return _between(found, _smallest(potential, free, bending, constraint, soft, guess), control, potential)
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
-    unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode)
+    unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode, bending)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
+
+
+def _smallest(
+    potential: Potential,
+    evaluation: Evaluation,
+    bending: Bending | None,
+    constraint: Array | None,
+    compliance: float,
+    guess: Array | None,
+) -> SmallestEigenvalue:
+    """The smallest eigenvalue of a state, with the nodes held that bodies hold in its evaluation."""
+    start = None if guess is None else evaluation.reduced(guess)
+    found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, compliance), start)
+    return replace(found, mode=evaluation.expanded(found.mode))
+
+
+def _between(held: SmallestEigenvalue, free: SmallestEigenvalue, control: str, potential: Potential) -> Verdict:
+    """The verdict where a body touches and does not press: perturbations may lift the membrane off it, and not push it in.
+
+    The least second variation among these lies between those with the touched points free and held.
+    """
+    among, shape = against(control, 0, potential.electric), partial(mode_shape, potential.space)
+    bounds = f"a body is touched without a force: the smallest eigenvalue is between {free.value:.6g} and {held.value:.6g}"
+    if free.value > free.error:
+        reason = f"stable: energy rises under all {among}; {bounds}"
+        return Verdict(True, free.value, free.error, control, 0, free.negative, reason, free.mode, shape, 0.0)
+    if held.value < -held.error:
+        reason = f"unstable: energy falls in {held.negative} direction(s) among {among}; {bounds}"
+        return Verdict(False, held.value, held.error, control, 0, held.negative, reason, held.mode, shape, 0.0)
+    return Verdict(None, free.value, held.value - free.value, control, 0, None, f"open among {among}: {bounds}", free.mode, shape, 0.0)
+
+
+def axisymmetric_pencil(
+    potential: Potential, evaluation: Evaluation, bending: Bending | None, constraint: Array | None, compliance: float
+) -> Pencil:
+    """K - lambda M of axisymmetric perturbations, with bending if given."""
+    band, mass, kd = evaluation.band, evaluation.reduced_mass(potential.mass), potential.space.half_bandwidth
+    constraint = None if constraint is None else evaluation.reduced(constraint)
+    if bending is not None:
+        band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
+    return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, evaluation.spring)
+
+
+def unbounded_below(potential: Potential, evaluation: Evaluation, bending: Bending | None) -> IllPosed | None:
+    """Where axisymmetric waves have ever lower eigenvalues the shorter they are; with bending only where a field leaves no stiffness along
+    the meridian, which bending does not replace.
+    """
+    shown = apparent(potential, evaluation)
+    if shown is None or (bending is not None and bending.positive and not shown.pulled):
+        return None
+    return ill_posed(potential, evaluation)
 
 
 def slack_all_over(evaluation: Evaluation) -> bool:

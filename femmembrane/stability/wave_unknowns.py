@@ -10,14 +10,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.harmonics import AROUND, RADIAL, supports_of_waves
 from ..discretization.numbering import band_of
 from ..discretization.space import Space
 from ..potential import Array
 from ..threads import cached_property
 from .second_variation import PAIRS, SLOPED_PAIRS, VALUES
-
-#: the fields a (radial), c (around the axis) and b (vertical) in the order of their coefficients
-RADIAL, AROUND, VERTICAL = range(3)
 
 
 class WaveUnknowns:
@@ -27,7 +25,7 @@ class WaveUnknowns:
         degree, n_elements = space.degree, space.n_elements
         n_local = degree + 1
         nodes = space.nodes[degree * np.arange(n_elements) + np.arange(n_local)[:, None]]
-        free, opposite = _supports(space, kind)
+        free, opposite = supports_of_waves(space, kind)
         self.n_free = int(free.sum())
         self.numbers: NDArray[np.int64] = np.full((space.n_nodes, 3), self.n_free, dtype=np.int64)
         self.numbers[free] = np.arange(self.n_free)
@@ -60,6 +58,7 @@ class WaveUnknowns:
             rows[2 * field, :, columns] = space.table[: space.n_quadrature, :n_local]
             rows[2 * field + 1, :, columns] = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
         self._values = space.table[: space.n_quadrature, :n_local]
+        self._slopes = space.table[space.n_quadrature : 2 * space.n_quadrature, :n_local]
         self._rows = rows
         self._table = self._products(PAIRS)
         kd, depth = self.half_bandwidth, 3 * self.half_bandwidth + 1
@@ -90,9 +89,11 @@ class WaveUnknowns:
         flat: Array = np.bincount(self._band_index, local.ravel(), self.n_free * depth + 1)  # type: ignore[assignment]  # weighted: floats
         return flat[:-1].reshape(self.n_free, depth).T
 
-    def integrate(self, density: Array) -> Array:
-        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions."""
+    def integrate(self, density: Array, slopes: Array | None = None) -> Array:
+        """Integrate densities of (a, c, b), shape (3, n_quadrature, n_elements), against the shape functions, and of their slopes."""
         local = np.concatenate([self._values.T @ part for part in density])
+        if slopes is not None:
+            local += np.concatenate([self._slopes.T @ part for part in slopes])
         for row, element in self.flips:
             local[row, element] *= -1
         total: Array = np.bincount(self.gather.ravel(), local.ravel(), self.n_free + 1)  # type: ignore[assignment]  # weighted: floats
@@ -110,35 +111,6 @@ class WaveUnknowns:
 def wave_unknowns(space: Space, kind: int) -> WaveUnknowns:
     """The unknowns of n waves in a space, ``kind`` = min(n, 2), remembered."""
     return WaveUnknowns(space, kind)
-
-
-def _supports(space: Space, kind: int) -> tuple[NDArray[np.bool_], list[int]]:
-    """Free fields (a, c, b) of each node, and the nodes on the axis at which c = -a.
-
-    A support that holds u holds both in-plane displacements. On the axis a smooth vector field has no in-plane part at n = 0, a
-    constant in-plane part at n = 1, and vanishes for larger n. Rigid motions that the supports leave cost nothing and are no perturbations.
-    One node is held against them, and no other motion is lost.
-    """
-    free = np.ones((space.n_nodes, 3), dtype=bool)
-    opposite = []
-    for node, support, on_axis in zip(space.nodes[[0, -1]].tolist(), space.supports, space.on_axis.tolist(), strict=False):
-        in_plane, vertical = "u" not in support.held, "w" not in support.held
-        if on_axis:
-            rigid = kind == 1 and vertical  # a pole that is held vertically is a fixed point
-            free[node] = [rigid, False, kind == 0 and vertical]
-            opposite += [node] if rigid else []
-        else:
-            free[node] = [in_plane, in_plane, vertical] if kind == 0 or not support.rigid else False
-    pinned = space.nodes[space.widest]
-    if kind == 0:
-        free[:, AROUND] = False
-        if space.pin is not None:
-            free[pinned, VERTICAL] = False
-    if kind == 1:  # at this radius a shift is seen in c, a tilt in b
-        shift, tilt = space.rotations
-        free[pinned, AROUND] &= not shift
-        free[pinned, VERTICAL] &= not tilt
-    return free, opposite
 
 
 def azimuthal_shape(space: Space, n: int, mode: Array) -> dict[str, Array]:

@@ -162,7 +162,7 @@ class _Check:
 
         def compressive(found: NewtonResult) -> bool:
             finer = found.evaluation.potential.scene
-            return bool((_deciding(finer, found.x, found.pressure, self.criterion)(s)[component] < 0).any())
+            return bool((_deciding(finer, found.evaluation.x, found.pressure, self.criterion)(s)[component] < 0).any())
 
         potential = potential_of(self.scene)
         return confirmed(compressive, potential, potential.evaluate(self.x, self.pressure), self.pressure) is not False

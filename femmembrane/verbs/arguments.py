@@ -10,7 +10,6 @@ from ..discretization.space import anchored
 from ..discretization.supports import as_support, floats
 from ..errors import InputError
 from ..physics.units import has_unit, in_unit
-from ..potential import Potential
 from ..quantities import SI_UNITS, quantity
 from ..results.analyses import asked
 from ..scene import MAX_STEPS, Scene
@@ -80,14 +79,6 @@ def check_max_steps(max_steps: Any) -> None:
 def check_ill_posed(ill_posed: Any) -> None:
     """Raise InputError unless ``ill_posed`` is a known word."""
     choice("ill_posed", ill_posed, ILL_POSED)
-
-
-def check_height(key: str, potential: Potential) -> None:
-    """Raise InputError where the height of the first point of the meridian is held, and cannot be prescribed."""
-    if potential.space.pole == potential.space.n_free:
-        raise InputError(
-            key, "a height", f"the first end of this {potential.scene.mesh.shape} is held along the axis; prescribe a volume or a pressure"
-        )
 
 
 def check_increasing(key: str, values: Any, most: int | None = None) -> tuple[int, ...]:

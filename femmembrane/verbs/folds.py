@@ -98,6 +98,8 @@ def fold_curve(
     P = 2.1605 at 0.05, P = 1.8792 at 0.00
     """
     check_scene(scene)
+    if scene.bodies:
+        raise InputError("parameter", parameter, "folds are not followed beside an obstacle; a trace for each value is allowed")
     named = Parameter(scene, parameter)
     low, high = _bounds(named, bounds, direction)
     check_ill_posed(ill_posed)

@@ -22,12 +22,12 @@ from ..results.path_memory import PathMemory
 from ..results.special_point import Jump, SpecialPoint
 from ..scene import MAX_STEPS, Scene
 from ..scene.run import AT_LIMIT
-from ..solve.controls import CONTROLS, Control, ControlKind, Controlled, Gas
+from ..solve.controls import CONTROLS, Control, ControlKind, Controlled, Gas, check_height
 from ..solve.load_path import SOLVERS, LoadPath, Turn
 from ..solve.number_path import NumberPath
 from ..solve.state import State
 from ..solve.wellposed import slackness
-from .arguments import check_height, kind_of, plain
+from .arguments import kind_of, plain
 from .meshing import carried
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record_on_borders, remembered, restore, resume, special_point

@@ -20,13 +20,13 @@ from ..scene import Scene
 from ..scene.run import GAS
 from ..solve import state_resolution
 from ..solve.continuation import BranchPoint, Followed, StepControl
-from ..solve.controls import CONTROLS, is_held
+from ..solve.controls import CONTROLS, check_height, is_held
 from ..solve.load_path import LoadPath
 from ..solve.number_curve import NUMBER, Borders, ControlledProblem, NumberPoint, first_controlled
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_point
 from ..solve.state import State
-from .arguments import check_height, check_ill_posed, check_max_steps
+from .arguments import check_ill_posed, check_max_steps
 from .over_number import AT_REST, Hold, OverNumber, checked_number, family_of, gas_of
 from .running import End
 from .state_records import OnStep, restore

@@ -92,6 +92,8 @@ def checked_number(key: str, scene: Scene, over: Any) -> Parameter:
     InputError
         For a name that the scene does not have.
     """
+    if scene.bodies:
+        raise InputError(key, over, "not done beside an obstacle; a run for each scene, with start=, is allowed")
     if over in HELD:
         allowed = ", ".join(names(scene)) or "(this scene has none)"
         raise InputError(key, over, f"no number of the scene; inflate, pressurize and trace follow it as it is. Numbers: {allowed}")

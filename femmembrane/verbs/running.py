@@ -94,7 +94,8 @@ class Run(ABC, Generic[R]):
 
     def scene_of(self, state: State) -> Scene:
         """The scene of a state."""
-        return self.scene
+        own = state.evaluation.potential
+        return self.scene.bordered(own.scene.borders) if own.obstacles else self.scene
 
     @abstractmethod
     def step(self) -> End | None:

@@ -40,9 +40,12 @@ def resume(potential: Potential, start: Equilibrium) -> State:
     start = start.of_branch
     if start.state.shape != (potential.space.n_free,):
         raise InputError("start", start, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
-    result = correct(potential, VolumeControl(start.volume), start.state, start.pressure)
+    x = start.state
+    if potential.obstacles and start.scene.borders:
+        x = start.potential.evaluate(x, start.pressure).carried(x)
+    result = correct(potential, VolumeControl(start.volume), x, start.pressure)
     if result.status is not Status.CONVERGED:
-        result = correct(potential, PressureControl(start.pressure), start.state, start.pressure)
+        result = correct(potential, PressureControl(start.pressure), x, start.pressure)
     if result.status is not Status.CONVERGED:
         raise SolveError("the start is no equilibrium of this scene", status=result.status)
     return State.of(result)
@@ -62,12 +65,14 @@ def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> Sta
     kept = kept.of_branch
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
+    if potential.obstacles:
+        potential = kept.potential
     evaluation = potential.evaluate(kept.state, kept.pressure, number)
     force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
     residual = relative_residual(potential, force, evaluation, kept.pressure)
     if not residual <= max(RESIDUAL, 10 * kept.residual):
         raise InputError("start", kept, f"an equilibrium of this scene is allowed; forces are out of balance by {residual:.1e}")
-    return State(kept.state, kept.pressure, evaluation, kept.iterations, 0.0, residual, 0.0)
+    return State(evaluation.carried(kept.state), kept.pressure, evaluation, kept.iterations, 0.0, residual, 0.0)
 
 
 def remembered(path: Predictor, unknowns: int) -> PathMemory:
@@ -95,7 +100,8 @@ def record(
     """
     bad = ill_posed(potential, state.evaluation)
     status = state.status if bad is None else bad.status
-    equilibrium = recorded(scene, potential, state.x, state.pressure, state.evaluation, status, state.residual, state.iterations, gas)
+    own = state.evaluation
+    equilibrium = recorded(scene, potential, own.x, state.pressure, own, status, state.residual, state.iterations, gas)
     for analysis in asked(scene):
         analysis.compute(equilibrium, previous, state.evaluation)
     if clock is not None:  # written last, for answers take time

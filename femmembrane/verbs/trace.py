@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, overload
 
-from ..errors import SolveError, Status
+from ..errors import InputError, SolveError, Status
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.special_point import SpecialPoint
+from ..results.tipped import TippedBranch
 from ..scene import Scene
 from ..solve.continuation import StepControl
 from ..threads import one_thread
@@ -17,7 +18,47 @@ from .meshing import on_chosen_mesh
 from .number_trace import NumberTraceRequest
 from .running import carry_out
 from .state_records import OnCheckpoint, OnStep
+from .tipped_trace import TippedRequest, trace_tipped
 from .trace_run import TraceRequest
+
+
+@overload
+def trace(
+    scene: Scene,
+    *,
+    start: float | Equilibrium | Branch | None = None,
+    until: Mapping[str, float] | None = None,
+    over: str | None = None,
+    hold: Mapping[str, float] | None = None,
+    direction: int | None = None,
+    max_steps: int = 400,
+    steps: StepControl | None = None,
+    special_points: bool = True,
+    ill_posed: str = "stop",
+    throw: bool = False,
+    on_step: OnStep | None = None,
+    on_checkpoint: OnCheckpoint | None = None,
+) -> Branch: ...
+
+
+@overload
+def trace(
+    scene: Scene,
+    *,
+    start: SpecialPoint,
+    until: Mapping[str, float] | None = None,
+    over: str | None = None,
+    hold: Mapping[str, float] | None = None,
+    direction: int | None = None,
+    max_steps: int = 400,
+    steps: StepControl | None = None,
+    special_points: bool = True,
+    ill_posed: str = "stop",
+    throw: bool = False,
+    on_step: OnStep | None = None,
+    on_checkpoint: OnCheckpoint | None = None,
+    harmonics: int | None = None,
+) -> Any: ...
 
 
 @one_thread
@@ -36,7 +77,8 @@ def trace(
     throw: bool = False,
     on_step: OnStep | None = None,
     on_checkpoint: OnCheckpoint | None = None,
-) -> Branch:
+    harmonics: int | None = None,
+) -> Branch | TippedBranch:
     """Follow a branch by arc length, stable or not, through limit points and folds.
 
     Parameters
@@ -48,6 +90,8 @@ def trace(
         * a volume; the default is the moderately inflated membrane, whose volume exceeds the volume at rest by an eighth of it, or by 0.5;
         * an equilibrium of this scene, or a special point of a branch, which counts as the equilibrium there;
         * a branch point of a branch of this scene: one half of the *crossing* branch is traced, ``fm.trace(scene, start=point)``;
+        * an azimuthal onset of a branch of this scene: the branch of states with waves around the axis that sets in there is traced. The
+          result is a :class:`TippedBranch`;
         * a traced branch, which is continued. Its points are part of the result. It keeps its own direction, step and search for special
           points, and the new points are the same to the last bit as without the interruption.
     until : mapping, optional
@@ -73,24 +117,28 @@ def trace(
     ill_posed : {"stop", "mark"}
         What to do where the states depend on the mesh: "stop" ends there, "mark" goes on and gives every such state its status. The states
         of a plain membrane depend on the mesh where the meridional stress is compressive, since the Legendre-Hadamard condition fails
-        there. The states of a tension field do where it is slack.
+        there. The states of a tension field do where it is slack. Beyond an azimuthal onset a trace goes on as long as the harmonics
+        resolve the states; where a stress is compressive, status and verdict of a state say so.
     throw : bool
         Raise when the branch ends before ``until`` is met. By default such a branch is returned, with the reason in its status and message.
     on_step : callable, optional
         Called with (index, total, equilibrium) after each step.
     on_checkpoint : callable, optional
-        Called after each step with the branch so far, which may be saved and later given as ``start``.
+        Called after each step with the branch so far, which may be saved and later given as ``start``; not from an azimuthal onset.
+    harmonics : int, optional
+        From an azimuthal onset: how many harmonics of its waves the displacement has around the axis. Default: as many as leave out less
+        than 5e-5 of the membrane's size, at most 24. Each state estimates what is left out, and says so where it is too much.
 
     Returns
     -------
-    Branch
+    Branch or TippedBranch
 
     Raises
     ------
     InputError, SolveError
-        InputError also for an azimuthal onset as start: the states beyond it are not axisymmetric, and are not computed. SolveError when
-        the start cannot be reached, when no mesh meets the accuracy that the scene asks for, and for ``throw``; then it carries the branch
-        as ``result``.
+        InputError also for an azimuthal onset as start where the states beyond it are not computed, with the reason. SolveError when the
+        start cannot be reached, when no mesh meets the accuracy that the scene asks for, and for ``throw``; then it carries the branch as
+        ``result``.
 
     Examples
     --------
@@ -105,6 +153,22 @@ def trace(
     ('unstable', 'stable')
     """
     check_scene(scene)
+    if isinstance(start, SpecialPoint) and start.kind == "azimuthal_onset" and over is None and hold is None:
+        asked = TippedRequest.checked(
+            start,
+            until,
+            direction=1 if direction is None else direction,
+            max_steps=max_steps,
+            steps=steps,
+            special_points=special_points,
+            harmonics=harmonics,
+        )
+        tipped = trace_tipped(scene, asked, on_step)  # type: ignore[arg-type]  # it takes the states of this branch
+        if throw and tipped.message and (until is not None or tipped.status is not Status.STEP_LIMIT):
+            raise SolveError(tipped.message, status=tipped.status, result=tipped)
+        return tipped
+    if harmonics is not None:
+        raise InputError("harmonics", harmonics, "allowed with an azimuthal onset as start only")
     common: dict[str, Any] = {"max_steps": max_steps, "steps": steps, "ill_posed": ill_posed, "special_points": special_points}
     if over is None and hold is None:
         request = TraceRequest.checked(start, until, direction=1 if direction is None else direction, **common)

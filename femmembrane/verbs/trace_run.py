@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
+
+import numpy as np
 
 from ..accuracy.borders import Solve, holding
 from ..checks import choice, is_number, number, sign
@@ -15,13 +17,14 @@ from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.path_memory import TraceMemory
 from ..results.special_point import SpecialPoint
-from ..scene import Scene
+from ..scene import ALL, Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
+from ..solve.active_set import contact_events
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
-from ..solve.controls import CONTROLS
+from ..solve.controls import CONTROLS, check_height
 from ..solve.finer_space import met_across
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
@@ -29,7 +32,7 @@ from ..solve.start import start_at_volume, usual_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..stability.azimuthal import azimuthal_eigenvalue
-from .arguments import check_height, check_ill_posed, check_max_steps
+from .arguments import check_ill_posed, check_max_steps
 from .meshing import carried
 from .over_number import gas_of
 from .running import End, Request, Run
@@ -37,6 +40,14 @@ from .state_records import OnStep, predictor_of, record_on_borders, remembered, 
 
 #: distance from a value at which a trace ends, in units of the membrane, that is none
 _AT_TARGET = 1e-9
+
+#: most numbers of waves that are tried one after the other for the first onset of all
+_MOST_WAVES = 20
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
+
+#: first and smallest steps are shorter where a body is nearer to the membrane at rest than its size over this
+_ROOM = 10.0
 
 Start: TypeAlias = float | Equilibrium | SpecialPoint | Branch | None
 
@@ -146,8 +157,8 @@ def checked_targets(until: Mapping[str, float] | None) -> dict[str, float]:
 def _of_this_branch(point: SpecialPoint) -> Equilibrium:
     if point.kind == "azimuthal_onset":
         message = (
-            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed; branch points, "
-            "folds and equilibria are allowed"
+            f"the states that set in there have {point.azimuthal} wave(s) around the axis and are not computed here; fm.trace follows them "
+            "without a number or a quantity held; branch points, folds and equilibria are allowed"
         )
         raise InputError("start", "azimuthal_onset", message)
     return point.equilibrium
@@ -202,7 +213,12 @@ class TraceRun(Run[Branch]):
         if GAS in request.targets:
             gas_of(scene, "until")
         self.request, self.on_step, self.problem = request, on_step, BranchProblem(self.potential)
-        self.tracer = Tracer(Predictor(), request.steps.first, request.steps)
+        steps = request.steps
+        if self.potential.obstacles:  # a body next to the membrane at rest leaves it that much room
+            space, rest = self.potential.space, np.zeros(self.potential.space.n_free)
+            room = min(1.0, _ROOM * cast("ContactPotential", self.potential).touching(rest) / space.unit)
+            steps = replace(steps, first=steps.first * room, smallest=steps.smallest * room)
+        self.tracer = Tracer(Predictor(), steps.first, steps)
         self.special: list[SpecialPoint] | None = [] if request.special_points else None
         self.regular = self.made = 0
         self.unexplained: list[str] = []
@@ -227,6 +243,8 @@ class TraceRun(Run[Branch]):
 
     def switched(self, start: SpecialPoint) -> BranchPoint:
         """The first point on half of the branch that crosses at a branch point."""
+        if start.equilibrium.contact is not None and start.equilibrium.contact.touching:
+            raise InputError("start", "branch_point", "branches are not switched in contact; an equilibrium or a volume is allowed")
         if start.tangent is None or start.tangent.shape != (self.potential.space.n_free + 1,):
             raise InputError("start", "branch_point", "one of the special_points of a branch of this scene is allowed")
         state = restore(self.potential, start.equilibrium)
@@ -387,7 +405,7 @@ class TraceRun(Run[Branch]):
         with self.timed("special_points"):
             located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
             crossed = self.crossed(segment)
-            for fold in sorted(located + crossed, key=lambda f: f.point.sigma):
+            for fold in sorted(located + crossed + contact_events(segment), key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
             return self.closing(segment, crossed, last)
@@ -418,14 +436,42 @@ class TraceRun(Run[Branch]):
         before, after = self.found[-2:]
         top = (end.sigma - segment.a.sigma) / segment.length
         for n in self.scene.analysis.azimuthal_modes:
+            if n == ALL:
+                self.special += self._worst_onset(segment, top)
+                continue
             verdict = before.verdict(azimuthal=n)
             if verdict.smallest_eigenvalue * after.verdict(azimuthal=n).smallest_eigenvalue < 0:  # False where either is NaN (short-wave)
-
-                def eigenvalue(point: BranchPoint, n: int = n, guess: Array | None = verdict.coefficients) -> float:
-                    return azimuthal_eigenvalue(self.potential_at(point), point.state.x, point.state.pressure, n, guess).value
-
                 with self.timed("special_points"):
-                    self.special.append(self._special(segment.root("azimuthal_onset", eigenvalue, 0.0, top), n))
+                    self.special.append(self._onset(segment, int(n), 0.0, top, verdict.coefficients))
+
+    def _onset(self, segment: Segment[BranchPoint], n: int, low: float, top: float, guess: Array | None = None) -> SpecialPoint:
+        def eigenvalue(point: BranchPoint) -> float:
+            potential, own = self.potential_at(point), point.state.evaluation
+            if potential.obstacles:
+                potential = own.potential
+            return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
+
+        return self._special(segment.root("azimuthal_onset", eigenvalue, low, top), n)
+
+    def _worst_onset(self, segment: Segment[BranchPoint], top: float) -> list[SpecialPoint]:
+        """The point, if any, where the first of all numbers of waves loses stability, or the last regains it.
+
+        The number that is the worst at the unstable end has an onset. Where another number is unstable at that onset, its own lies nearer
+        to the stable end, and takes its place.
+        """
+        ends = [equilibrium.verdict(azimuthal=ALL) for equilibrium in self.found[-2:]]
+        if not ends[0].smallest_eigenvalue * ends[1].smallest_eigenvalue < 0:  # False where either is NaN
+            return []
+        n = next(verdict.azimuthal for verdict in ends if verdict.smallest_eigenvalue < 0)
+        with self.timed("special_points"):
+            point = self._onset(segment, n, 0.0, top)
+            for _ in range(_MOST_WAVES):
+                worst = point.equilibrium.verdict(azimuthal=ALL)
+                if worst.azimuthal == n or not worst.smallest_eigenvalue < 0 or worst.stable is None:
+                    break
+                n = worst.azimuthal
+                point = self._onset(segment, n, 0.0, top)
+        return [point]
 
     def _special(self, fold: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:
         return special_point(self, self.scene_of(fold.point.state), fold, azimuthal)

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from ..errors import Status
 from ..quantities import PLACES, Units, axis_label, key_label
 from ..results.curve import half_way, turning
+from ..results.postbuckling import SUBCRITICAL, UNKNOWN
 from ..results.special_point import SpecialPoint
+from ..scene import ALL
 from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
+from .labels import add_label
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
 if TYPE_CHECKING:
@@ -109,10 +112,45 @@ def draw_branch(
         axes.plot(*points[-1], "X", color=RED, markeredgecolor="white", markersize=10, zorder=5, label=f"ends here: {branch.status}")
 
 
-class _Shown:
-    """What the axes show of a branch: two quantities, each times a factor."""
+@dataclass(frozen=True, eq=False)
+class Strands:
+    """All that a picture shows of a branch in several quantities at once, of which a reader chooses two.
 
-    def __init__(self, branch: Branch, quantities: tuple[str, str], units: Units) -> None:
+    Attributes
+    ----------
+    lines : list of (Style, ndarray of shape (n, number of quantities))
+        The curve with the styles of its verdicts.
+    bands : list of (tuple of int, ndarray)
+        Stretches that are unstable to azimuthal modes, with their numbers of waves.
+    snaps : list of ndarray of shape (2, number of quantities)
+    steps, points : ndarray
+        Places of the equilibria, and of the special points.
+    """
+
+    lines: list[tuple[Style, Array]]
+    bands: list[tuple[tuple[int | str, ...], Array]]
+    snaps: list[Array]
+    steps: Array
+    points: Array
+
+    @classmethod
+    def of(cls, branch: Branch, quantities: Sequence[str], units: Units) -> Strands:
+        """The strands of a branch in these quantities, in these units."""
+        shown = _Shown(branch, quantities, units)
+        segments = _segments(shown, _words(branch, branch.scene.analysis.stability))
+        return cls(
+            list(_lines(segments, lambda piece: style_of(piece.words) if piece.known else UNRESOLVED)),
+            [band for band in _azimuthal(branch, shown) if band[0]],
+            [shown.ends(gap.snap) for gap in shown.curve.gaps if gap.snap is not None],
+            shown.at(branch),
+            shown.at(branch.special_points or ()),
+        )
+
+
+class _Shown:
+    """What the axes show of a branch: quantities, each times a factor."""
+
+    def __init__(self, branch: Branch, quantities: Sequence[str], units: Units) -> None:
         self.quantities, self.curve = quantities, branch.curve
         for name in quantities:
             if name not in PLACES:
@@ -123,7 +161,7 @@ class _Shown:
     def at(self, items: Sequence[Equilibrium | SpecialPoint]) -> Array:
         """Places in the picture of the steps of the branch, or of special points."""
         values = [[self._value(k, item, q) for q in self.quantities] for k, item in enumerate(items)]
-        return np.array(values, dtype=float).reshape(-1, 2) * self.factors
+        return np.array(values, dtype=float).reshape(-1, len(self.quantities)) * self.factors
 
     def _value(self, number: int, item: Equilibrium | SpecialPoint, quantity: str) -> float:
         if quantity in PLACES:
@@ -288,14 +326,21 @@ def _draw_lines(
 
 def _draw_azimuthal(axes: Axes, branch: Branch, shown: _Shown) -> None:
     """A grey band behind the stretches that lose stability to azimuthal modes, darker for more of them, and for shorter waves."""
-    words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
-    lines = list(_lines(_segments(shown, words), lambda p: tuple(n for n, word in p.words.items() if word == "unstable")))
-    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), lost))
+    lines = list(_azimuthal(branch, shown))
+    order = sorted({lost for lost, _ in lines if lost}, key=lambda lost: (len(lost), [n if isinstance(n, int) else 0 for n in lost]))
     for lost, line in lines:
         if lost:
-            named = new_label(axes, "unstable to azimuthal n = " + ", ".join(map(str, lost)))
+            named = new_label(axes, "unstable to azimuthal n = " + ", ".join("any" if n == ALL else str(n) for n in lost))
             grey = str(max(0.84 - 0.14 * order.index(lost), 0.4))
             axes.plot(*line.T, color=grey, linewidth=8, solid_capstyle="butt", zorder=1, label=named)
+
+
+def _azimuthal(branch: Branch, shown: _Shown) -> Iterator[tuple[tuple[int | str, ...], Array]]:
+    """The stretches of the line by the azimuthal modes to which they are unstable."""
+    if not branch.scene.analysis.azimuthal_modes:
+        return iter(())
+    words: list[dict[Any, str]] = [{n: e.verdict(azimuthal=n).word for n in branch.scene.analysis.azimuthal_modes} for e in branch]
+    return _lines(_segments(shown, words), lambda piece: tuple(n for n, word in piece.words.items() if word == "unstable"))
 
 
 def _draw_wrinkling(axes: Axes, branch: Branch, shown: _Shown) -> None:
@@ -316,13 +361,22 @@ def _draw_jumps(axes: Axes, shown: _Shown) -> None:
             axes.plot([], [], color=RED, linewidth=1.6, label=new_label(axes, "snap"))
 
 
+def after(point: SpecialPoint) -> str:
+    """Of an azimuthal onset: subcritical or supercritical at a held volume; empty where that is not known, and of other points."""
+    kind = point.postbuckling.kind if point.azimuthal else UNKNOWN
+    return "" if kind == UNKNOWN else kind
+
+
 def _draw_special_points(axes: Axes, branch: Branch, shown: _Shown) -> None:
     points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit)]
-    for kind in dict.fromkeys(str(p.kind) for p in points):
+    looks = [(str(p.kind), after(p)) for p in points]
+    for kind, word in dict.fromkeys(looks):
         marker, named = MARKERS.get(kind, ("X", kind.replace("_", " ")))
-        places = shown.at([p for p in points if str(p.kind) == kind])
-        look: dict[str, Any] = {"markersize": 7, "markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 1.2}
+        named = f"{named}, {word}" if word else named
+        places = shown.at([p for p, look in zip(points, looks, strict=True) if look == (kind, word)])
+        face = "black" if word == SUBCRITICAL else "white"
+        look: dict[str, Any] = {"markersize": 7, "markerfacecolor": face, "markeredgecolor": "black", "markeredgewidth": 1.2}
         axes.plot(*places.T, marker, label=new_label(axes, named), zorder=4, **look)
     for point, place in zip(points, shown.at(points), strict=True):
         if point.azimuthal:
-            axes.annotate(f"n = {point.azimuthal}", place, xytext=(5, 4), textcoords="offset points", fontsize=8, zorder=5)
+            add_label(axes, f"n = {point.azimuthal}", place, size=8)

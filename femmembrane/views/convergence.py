@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import unknown_name
 from ..quantities import axis_label
 from ..results.convergence import RESOLVED, Convergence
-from .figures import new_figure, save_figure
+from .figures import fitting_columns, new_figure, save_axes, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +32,13 @@ _DASHES: tuple[Any, ...] = (
 
 
 def plot_convergence(
-    study: Convergence, path: str | PathLike[str] | None = None, *, quantities: Sequence[str] | None = None, against: str = "unknowns"
-) -> Figure:
+    study: Convergence,
+    path: str | PathLike[str] | None = None,
+    *,
+    ax: Axes | None = None,
+    quantities: Sequence[str] | None = None,
+    against: str = "unknowns",
+) -> Figure | Axes:
     """One panel a quantity, one line a degree with its own marker and dashes; the last order that is resolved stands at its line.
 
     Hollow markers in the grey band are errors that the reference does not resolve.
@@ -43,6 +48,8 @@ def plot_convergence(
     study : Convergence
     path : path, optional
         Picture to write; the suffix chooses the format.
+    ax : matplotlib Axes, optional
+        Where to draw one quantity, the first of ``quantities``.
     quantities : sequence of str, optional
         Default: pressure (or volume, where the pressure is held), the eigenvalue under the other control, the profile in both norms.
     against : {"unknowns", "element_size"}
@@ -59,17 +66,26 @@ def plot_convergence(
     for name in asked:
         if name not in study.quantities:
             raise unknown_name("quantities", str(name), study.quantities)
+    if ax is not None:
+        handles = _draw(ax, study, asked[0], against)
+        ax.set_ylabel("relative error (numbers: observed orders)")
+        ax.legend(handles=[*handles, _band()], fontsize=9, framealpha=0.9, edgecolor="none", handlelength=3.6)
+        return save_axes(ax, path)
     figure, axes = new_figure((3.3 * len(asked) + 0.4, 4.4), title=study.scene.title or " ", widths=(1.0,) * len(asked))
-    from matplotlib.patches import Patch
-
-    handles: list[Any] = []
+    handles = []
     for panel, name in zip(np.atleast_1d(axes), asked, strict=True):
         handles = _draw(panel, study, name, against)
     np.atleast_1d(axes)[0].set_ylabel("relative error (numbers: observed orders)")
-    handles.append(Patch(color="0.92", label="not resolved"))
-    columns = min(len(handles), 2 * len(asked))
+    handles.append(_band())
+    columns = min(len(handles), 2 * len(asked), fitting_columns(figure))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=9, handlelength=3.6)
     return save_figure(figure, path)
+
+
+def _band() -> Any:
+    from matplotlib.patches import Patch
+
+    return Patch(color="0.92", label="not resolved")
 
 
 def _draw(axes: Axes, study: Convergence, name: str, against: str) -> list[Any]:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..checks import choice
 from ..errors import InputError
 from ..quantities import axis_label, heading
 from .backend import title_text
-from .figures import new_figure, save_figure
+from .figures import fitting_columns, new_figure, save_axes, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +31,7 @@ _METHODS: dict[str, tuple[str, Any, str]] = {
 _DARK = "#222222"
 
 
-def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
+def plot_cost(study: Cost, path: str | PathLike[str] | None = None, *, ax: Axes | None = None, start: str | None = None) -> Figure | Axes:
     """Relative error against wall time of one equilibrium, one panel for each kind of start. A broad line joins the solves that no other
     solve beats.
 
@@ -43,22 +44,28 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
         With one or more solves that converged.
     path : path, optional
         Picture to write; the suffix chooses the format.
+    ax : matplotlib Axes, optional
+        Where to draw one kind of start.
+    start : {"warm", "cold"}, optional
+        The only kind that is drawn.
 
     Raises
     ------
     InputError
-        Without solves that converged, or for a file that cannot be written.
+        Without solves that converged, for an unknown kind of start, or for a file that cannot be written.
     """
     solves = [line for line in study.select(what="solve") if line.converged]
-    starts = [start for start in _HEADINGS if any(line.start == start for line in solves)]
+    kinds = _HEADINGS if start is None else (choice("start", start, _HEADINGS),)
+    starts = [kind for kind in kinds if any(line.start == kind for line in solves)]
     if not starts:
         raise InputError("study", "no solves", "a study with one or more converged solves is needed")
-    figure, row = new_figure((4.9 * len(starts) + 1.2, 5.2), widths=[1.0] * len(starts))
+    if ax is None:
+        figure, row = new_figure((4.9 * len(starts) + 1.2, 5.2), widths=[1.0] * len(starts))
+    panels: Any = np.atleast_1d(row) if ax is None else [ax]
     floor = study.reference.error
-    panels = np.atleast_1d(row)
-    for axes, start in zip(panels, starts, strict=True):
-        _draw(axes, [line for line in solves if line.start == start], floor)
-        axes.set_title(_HEADINGS[start], fontsize=10)
+    for axes, kind in zip(panels, starts, strict=False):
+        _draw(axes, [line for line in solves if line.start == kind], floor)
+        axes.set_title(_HEADINGS[kind], fontsize=10)
         axes.set_xlabel(axis_label("milliseconds"))
         axes.set_ylabel(f"relative error of the {study.quantity}" if axes is panels[0] else "")
         axes.sharey(panels[0])
@@ -66,8 +73,16 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None) -> Figure:
     panels[0].set_ylim(bottom, 3 * max(max(line.error for line in solves), floor))
     for axes in panels:
         axes.axhspan(bottom, floor, color="0.85", linewidth=0, zorder=0, label="below the error of the reference")
+    if ax is not None:
+        ax.legend(fontsize=8.5, framealpha=0.9, edgecolor="none", handlelength=3.4)
+        return save_axes(ax, path)
     entries = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    look: dict[str, Any] = {"ncols": 4 if len(starts) > 1 else 2, "frameon": False, "fontsize": 8.5, "handlelength": 3.4}
+    look: dict[str, Any] = {
+        "ncols": min(4 if len(starts) > 1 else 2, fitting_columns(figure)),
+        "frameon": False,
+        "fontsize": 8.5,
+        "handlelength": 3.4,
+    }
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", **look)
     title = f"{title_text(study.scene.title)}, " if study.scene.title else ""
     figure.suptitle(f"{title}{heading(study.control)} = {study.load:.6g}", fontsize=11, wrap=True, parse_math=False)

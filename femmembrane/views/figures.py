@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..files import replace_file
 from .backend import drawing, load, title_text
+from .journal import fit, layout
+from .labels import covered, settle
 from .zones import zone_order
 
 if TYPE_CHECKING:
@@ -27,6 +29,12 @@ if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
 
 _DPI = 160
+#: points that lines and markers keep from a legend
+_CLEAR = 4.0
+#: inches below which a figure has its legend in one column below
+_NARROW = 5.0
+#: inches of a column of a legend
+_COLUMN = 1.6
 _LIVE_TEXT: Any = {"svg.fonttype": "none", "pdf.fonttype": 42}
 
 
@@ -161,8 +169,17 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
     figure : Figure
     axes : Axes, or array of Axes
     """
-    figure = shown_figure(size)
-    row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
+    load()
+    fitted, across = layout(size, len(widths))
+    figure = shown_figure(fitted)
+    setattr(figure, _HEIGHTS, {None: fitted[1]})
+    if across == len(widths):
+        row = figure.subplots(1, len(widths), width_ratios=list(widths), squeeze=False)[0]
+    else:  # a narrow style
+        whole = figure.subplots(-(-len(widths) // across), across, squeeze=False).ravel()
+        row = whole[: len(widths)]
+        for spare in whole[len(widths) :]:
+            spare.remove()
     for axes in row:
         axes.spines[["top", "right"]].set_visible(False)
     look: dict[str, Any] = {"fontsize": 11, "wrap": True, "parse_math": False}
@@ -174,21 +191,25 @@ def new_figure(size: tuple[float, float], *, title: str = "", widths: Sequence[f
 
 
 def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
-    """Write a figure (nothing for None) whole or not at all, and return it; the suffix must be a format that Matplotlib writes.
+    """Fit a figure to Matplotlib's style, write it (nothing for None) whole or not at all, and return it.
+
+    The suffix must be a format that Matplotlib writes.
 
     Text in SVG and PDF files stays text, which programs for drawing can edit.
     """
+    fit(figure)
+    settle(figure)
     if path is not None:
         formats = figure.canvas.get_supported_filetypes()
         if Path(path).suffix[1:].lower() not in formats:
             raise InputError(
                 "path", str(path), "a name that ends in one of these is needed: " + ", ".join(f".{f}" for f in sorted(formats))
             )
-        from matplotlib import rc_context
+        from matplotlib import rc_context, rcParams
 
         with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT):
             try:
-                figure.savefig(temporary, dpi=_DPI)
+                figure.savefig(temporary, dpi=_DPI if rcParams["savefig.dpi"] == "figure" else rcParams["savefig.dpi"])
             except (RuntimeError, FileNotFoundError) as error:
                 if Path(path).suffix.lower() != ".pgf":
                     raise
@@ -196,13 +217,79 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
     return figure
 
 
+def save_axes(axes: Axes, path: str | PathLike[str] | None) -> Axes:
+    """Fit and write the figure of axes that somebody gave, as :func:`save_figure`, and return the axes."""
+    whole = axes.get_figure(root=True)
+    if whole is not None:
+        save_figure(whole, path)
+    return axes
+
+
 def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
-    """A legend of what is named, if anything is; ``look`` goes to Matplotlib's ``legend``."""
+    """A legend of what is named, if anything is; ``look`` goes to Matplotlib's ``legend``.
+
+    It stands in the axes. In a figure of this package, where it would cover a line, it stands below them, and the figure grows.
+    """
+    from matplotlib.transforms import ScaledTranslation
+
     handles, labels = legend_entries(axes)
-    if handles:
-        usual: dict[str, Any] = {"fontsize": 9, "title_fontsize": 9, "framealpha": 0.9, "edgecolor": "none", "handlelength": 3.2}
-        legend = axes.legend(handles, labels, title=heading, **(usual | look))
+    if not handles:
+        return
+    usual: dict[str, Any] = {"fontsize": 9, "title_fontsize": 9, "framealpha": 0.9, "edgecolor": "none", "handlelength": 3.2}
+    figure = axes.get_figure(root=True)
+
+    def draw(**more: Any) -> Any:
+        legend = axes.legend(handles, labels, title=heading, **(usual | look | more))
         legend.set_alignment("left")
+        if figure is not None:
+            fit(figure)
+        return legend
+
+    _grow(axes, 0.0)
+    legend = draw()
+    if figure is None or not hasattr(figure, _HEIGHTS) or "loc" in look or not covers(legend, axes):
+        return  # in figures of others there may be no room below
+    legend.remove()
+    low = axes.get_window_extent().y0 - axes.xaxis.get_tightbbox().y0  # type: ignore[union-attr]  # the axes are shown
+    place = axes.transAxes + ScaledTranslation(0.0, -low / figure.dpi - 0.05, figure.dpi_scale_trans)
+    legend = draw(loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=place, borderaxespad=0.0, framealpha=0.0)
+    _grow(axes, legend.get_window_extent().height / figure.dpi)
+
+
+def covers(legend: Any, axes: Axes) -> bool:
+    """Whether a legend lies over a line, a marker or words in its axes."""
+    figure = legend.get_figure(root=True)
+    figure.draw_without_rendering()
+    box = legend.get_window_extent().padded(_CLEAR * figure.dpi / 72)
+    return covered(axes, box) > 0 or any(box.overlaps(text.get_window_extent()) for text in axes.texts if text.get_text())
+
+
+#: height in inches that a figure of this package had before a legend stood below its axes, and the heights of these legends
+_HEIGHTS = "_femmembrane_heights"
+
+
+def _grow(axes: Axes, height: float) -> None:
+    """Give a figure of this package the height of its own and of the highest legend below its axes."""
+    figure = axes.get_figure(root=True)
+    heights = getattr(figure, _HEIGHTS, None)
+    if figure is not None and heights is not None:
+        heights[axes] = height
+        figure.set_size_inches(figure.get_size_inches()[0], heights[None] + max(heights[a] for a in heights if a is not None))
+
+
+def fitting_columns(figure: Figure) -> int:
+    """Columns of a legend for which a figure is wide enough."""
+    return max(int(figure.get_size_inches()[0] / _COLUMN), 1)
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str], columns: int = 1, **look: Any) -> None:
+    """A legend below all axes of a figure, in one column where the figure is narrow."""
+    narrow = figure.get_size_inches()[0] < _NARROW
+    usual: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 3.2, "ncols": 1 if narrow else columns}
+    figure.legend(handles, labels, loc="outside lower left", **(usual | look))
+    if narrow:
+        width, height = figure.get_size_inches()
+        figure.set_size_inches(width, height + 0.16 * len(handles))
 
 
 def legend_entries(axes: Axes) -> tuple[list[Any], list[str]]:

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantities import axis_label, key_label
+from ..checks import choice
+from ..quantities import PLACES, axis_label, key_label
 from ..results.folds import FOLD_NAMES, FoldCurve
-from .backend import title_text
-from .figures import save_figure, shown_figure
+from .backend import load, title_text
+from .figures import save_axes, save_figure, shown_figure
+from .journal import layout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,15 +27,24 @@ _PARTS, _SAME = 12, 1e-9
 _MARKERS = {"cusp": ("D", "cusp: two of them merge"), "branch_point": ("s", "branch point: limit point meets volume fold")}
 
 
-def plot_fold_curve(curve: FoldCurve, path: str | PathLike[str] | None = None) -> Figure:
-    """Pressure and volume of the fold against the number, also written to ``path`` if given.
+def plot_fold_curve(
+    curve: FoldCurve, path: str | PathLike[str] | None = None, *, ax: Axes | None = None, y: str = "pressure"
+) -> Figure | Axes:
+    """Pressure and volume of the fold against the number, or one of its quantities on given axes.
 
     Raises
     ------
     InputError
-        For a file that cannot be written.
+        For a file that cannot be written, and an unknown quantity.
     """
-    figure = shown_figure((6.4, 6.0))
+    choice("y", y, PLACES)
+    if ax is not None:
+        _draw(ax, curve, y)
+        ax.set(xlabel=key_label(curve.parameter), ylabel=f"at the fold: {axis_label(y)}")
+        ax.legend(fontsize=9, framealpha=0.9, edgecolor="none")
+        return save_axes(ax, path)
+    load()
+    figure = shown_figure(layout((6.4, 6.0), 1)[0])
     panels = figure.subplots(2, 1, sharex=True)
     title = curve.equilibria[0].scene.title if curve.equilibria else ""
     heading = title_text(title) or FOLD_NAMES[curve.kind][0].upper() + FOLD_NAMES[curve.kind][1:]

@@ -17,7 +17,7 @@ from ..errors import InputError, Status, unknown_name
 from ..quantities import Units, axis_label, key_label
 from ..results.grid import DIMENSIONS, place_of_variable
 from .backend import title_text
-from .figures import new_figure, save_figure
+from .figures import fitting_columns, new_figure, save_axes, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,8 +43,14 @@ _COUNTS = ("limit_points", "volume_folds", "equilibria", "stable_equilibria", "a
 _SHADES = 9
 
 
-def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Sequence[str] | None = None, units: str = "scaled") -> Figure:
-    """One panel for each variable: a map over two keys, or a curve over one.
+def plot_grid(
+    sweep: Sweep,
+    path: str | PathLike[str] | None = None,
+    show: Sequence[str] | None = None,
+    units: str = "scaled",
+    ax: Axes | None = None,
+) -> Figure | Axes:
+    """One panel for each variable: a map over two keys, or a curve over one. On given axes: the first variable.
 
     Raises
     ------
@@ -62,14 +68,24 @@ def plot_grid(sweep: Sweep, path: str | PathLike[str] | None = None, show: Seque
     if not panels:
         raise InputError("sweep", sweep.quantity, "no scene has a result to show; status and message say why")
     draw = _draw_map if len(dims) == 2 else _draw_curve
-    figure, row = new_figure((5.2 * len(panels) + 0.4, 4.9), widths=[1.0] * len(panels))
     handles: dict[str, Any] = {}
     hatches: dict[str, str] = {}
-    for axes, (name, values) in zip(np.atleast_1d(row), panels, strict=True):
+    if ax is None:
+        figure, row = new_figure((5.2 * len(panels) + 0.4, 4.9), widths=[1.0] * len(panels))
+    for axes, (name, values) in zip(np.atleast_1d(row) if ax is None else [ax], panels, strict=ax is None):
         handles |= draw(axes, data, dims, name, _label(name, chosen), values, hatches)
+    if ax is not None:
+        if handles:
+            ax.legend(list(handles.values()), list(handles), framealpha=0.9, edgecolor="none", fontsize=8.5)
+        return save_axes(ax, path)
     if handles:
         figure.legend(
-            list(handles.values()), list(handles), loc="outside lower center", frameon=False, fontsize=8.5, ncols=min(3, len(handles))
+            list(handles.values()),
+            list(handles),
+            loc="outside lower center",
+            frameon=False,
+            fontsize=8.5,
+            ncols=min(3, len(handles), fitting_columns(figure)),
         )
     figure.suptitle(title_text(sweep.scene.title), fontsize=11, wrap=True, parse_math=False)
     return save_figure(figure, path)

@@ -64,9 +64,10 @@ def _draw_sources(axes: Axes, shown: Sequence[Equilibrium], units: Units) -> Non
             arrow = {"arrowstyle": "-|>", "color": RED, "linewidth": 2.0, "mutation_scale": 14}
             axes.annotate("", xy=(0, tip), xytext=(0, tail), arrowprops=arrow)
             axes.update_datalim([(0, tail), (0, tip)])
-        look: dict[str, Any] = {"color": RED, "linewidth": 2.5, **({"marker": "o", "markersize": 6} if rho.size == 1 else {})}
+        point: dict[str, Any] = {"marker": "o", "markersize": 6} if rho.size == 1 else {}
+        look: dict[str, Any] = {"color": "0.45" if body.rigid else RED, "linewidth": 2.5, **point}
         for side in (1, -1) if rho.any() else (1,):
-            axes.plot(side * rho, z, label=_named(body.label, units) if side > 0 else None, **look)
+            axes.plot(side * rho, z, label=_named(body.label, units) if side > 0 and body.label else None, **look)
     for name in around.absent:
         axes.plot([], [], " ", label=f"({_named(name, units)})")
 

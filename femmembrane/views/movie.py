@@ -20,6 +20,8 @@ Frame = NDArray[np.uint8]
 SUFFIXES = (".gif", ".mp4")
 #: number of frames, first and last included, that choose the colours of a GIF
 _SAMPLES = 6
+#: what is as light as this is paper
+_PAPER = 240
 
 
 def check_movie(path: str | PathLike[str]) -> None:
@@ -63,11 +65,12 @@ def _write_gif(frames: Sequence[Frame], path: Path, rate: float, hold: float) ->
 
     chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLES).round().astype(int))
     # one palette for all frames and no dithering: nothing flickers, and parts at rest cost no bytes
-    palette = Image.fromarray(np.concatenate([frames[k][::3, ::3] for k in chosen])).quantize(
-        256, method=Image.Quantize.MAXCOVERAGE, kmeans=3
-    )
+    seen = np.concatenate([frames[k][::3, ::3].reshape(-1, 3) for k in chosen])
+    ink = seen[seen.min(axis=1) < _PAPER]
+    paper = np.full((max(ink.shape[0] // 100, 1), 3), 255, dtype=np.uint8)  # one colour, whatever its share of the picture
+    palette = Image.fromarray(np.concatenate([paper, ink])[None]).quantize(256, method=Image.Quantize.MEDIANCUT, kmeans=3)
     colors = np.array(palette.getpalette()).reshape(-1, 3)
-    colors[colors.min(axis=1) > 240] = 255  # the paper is white: its colour is matched to a few units only
+    colors[colors.min(axis=1) > _PAPER] = 255  # the paper is white: its colour is matched to a few units only
     palette.putpalette(colors.ravel().tolist())
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     milliseconds = [round(1000 / rate)] * len(images)

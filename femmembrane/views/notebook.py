@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..quantities import PLACES, title, words
-from ..results.error_estimate import ESTIMATED
+from ..results.branch import Branch
 from ..results.folds import FOLD_NAMES
 from . import plots
 from .branch_lines import COLORS
+from .explorer import framed
 from .figures import png
 from .html import branch_rows, equilibrium_pairs, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..results.branch import Branch
     from ..results.equilibria import Equilibria
     from ..results.equilibrium import Equilibrium
     from ..results.error_estimate import ErrorEstimate
@@ -33,9 +33,14 @@ _SIDE_BY_SIDE = "display:flex;flex-wrap:wrap;gap:24px;align-items:center"
 
 
 def branch_html(branch: Branch) -> str:
-    """Pressure against volume, a table of at most twelve equilibria, and how the branch ended."""
+    """The branch to explore; where scripts are not allowed, a still picture with a table."""
     if not len(branch):
         return f"<p>No equilibria: {escape(branch.message or str(branch.status))}</p>"
+    return framed(branch, _still(branch))
+
+
+def _still(branch: Branch) -> str:
+    """Pressure against volume, a table of at most twelve equilibria, and how the branch ended."""
     header, rows = branch_rows(branch, _ROWS)
     count = f"{len(branch)} equilibria" + (f", {len(rows)} of them shown" if len(rows) < len(branch) else "")
     notes = "".join(f"<p>{escape(note)}</p>" for note in (branch.mesh_used, branch.message) if note)
@@ -44,14 +49,15 @@ def branch_html(branch: Branch) -> str:
 
 
 def equilibrium_html(equilibrium: Equilibrium) -> str:
-    """Numbers and verdicts beside the deformed meridian."""
+    """The equilibrium in space with its verdicts; where scripts are not allowed, numbers and verdicts beside the deformed meridian."""
     figure, axes = plots.new_figure((4.6, 4.4))
     plots.draw_profile(axes, equilibrium, plots.PLAIN)
     plots.draw_surroundings(axes, [equilibrium])
     handles, labels = plots.legend_entries(axes)
     figure.legend(handles, labels, loc="outside lower left", frameon=False, fontsize=9)
     known = table(["", ""], equilibrium_pairs(equilibrium))
-    return f'<div style="{_SIDE_BY_SIDE}">{_picture(figure, "Deformed meridian")}{known}</div>'
+    still = f'<div style="{_SIDE_BY_SIDE}">{_picture(figure, "Deformed meridian")}{known}</div>'
+    return framed(Branch(equilibrium.scene, (equilibrium,)), still)
 
 
 def zones_html(zones: Zones) -> str:
@@ -92,7 +98,7 @@ def fold_curve_html(curve: FoldCurve) -> str:
 
 def error_estimate_html(estimate: ErrorEstimate) -> str:
     """A table of values and their errors."""
-    rows = [[words(name), d.value, d.error, d.relative] for name in ESTIMATED for d in [getattr(estimate, name)]]
+    rows = [[words(name), d.value, d.error, d.relative] for name in estimate.shown for d in [getattr(estimate, name)]]
     caption = f"Errors at the same {words(estimate.control)}; {estimate.method}"
     reason = f"<p>{escape(estimate.reason)}</p>" if estimate.reason else ""
     return table(["", "value", "error", "relative"], rows, caption=caption) + reason

@@ -33,12 +33,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: pixels of a frame along each side of one that is shown
+FINER = 2
 #: points along a drawn meridian with fewer nodes
 _POINTS = 101
 _MAP = "viridis"
 _SOURCE = "#b03060"
 #: little shading, so that the colours stay those of the scale
-_MATT: dict[str, Any] = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
+_MATT: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
 #: the number of each kind of zones, in the middle of its colour, and its name beside it
 _ZONE_LIMITS = (-0.5, len(KINDS) - 0.5)
 _ZONE_NAMES = ("taut", "radial", "circum-\nferential", "both\nways")
@@ -100,8 +102,8 @@ class Surface:
     values: Array
 
     @classmethod
-    def of(cls, equilibrium: Equilibrium, quantity: str, sectors: int = 4 * SECTORS) -> Surface:
-        """The surface of an equilibrium.
+    def of(cls, equilibrium: Equilibrium, quantity: str, sectors: int = 4 * SECTORS, most: int | None = None) -> Surface:
+        """The surface of an equilibrium, with at most so many points along its meridian.
 
         Raises
         ------
@@ -114,7 +116,7 @@ class Surface:
             s = np.unique(np.concatenate([np.linspace(ends[0], ends[-1], _POINTS), [zone.s[1] for zone in zones]]))
             profile, values = equilibrium.profile(s), zones.numbers((s[1:] + s[:-1]) / 2).astype(np.float64)
         else:
-            profile = smooth_profile(equilibrium, points=_POINTS)
+            profile = smooth_profile(equilibrium, points=min(_POINTS, most or _POINTS), most=most)
             values = profile[quantity]
         return cls(
             equilibrium,
@@ -129,6 +131,16 @@ class Surface:
     def points(self) -> Array:
         """Positions, shape (n_points, 3)."""
         return self.revolution.vectors(self.rho, self.eta)
+
+    @property
+    def normals(self) -> Array:
+        """Normals of the deformed surface at the points, shape (n_points, 3)."""
+        along = np.stack([np.gradient(self.rho), np.gradient(self.eta)])
+        along /= np.maximum(np.linalg.norm(along, axis=0), 1e-300)
+        found = self.revolution.vectors(-along[1], along[0])
+        on_axis = np.abs(self.rho) <= 1e-12 * np.abs(self.rho).max()
+        found[on_axis[self.revolution.node]] = (0.0, 0.0, 1.0)
+        return found
 
     @property
     def box(self) -> Box:
@@ -158,50 +170,131 @@ def _has(scene: Scene, name: str) -> bool:
 
 
 @contextmanager
-def new_plotter(size: tuple[int, int], off_screen: bool = True) -> Iterator[pyvista.Plotter]:
-    """A white picture that is closed at the end."""
+def new_plotter(size: tuple[int, int], off_screen: bool = True, *, frames: bool = False) -> Iterator[pyvista.Plotter]:
+    """A white picture that is closed at the end.
+
+    For frames of a movie it is :data:`FINER` times as large, and :func:`frame` takes the mean of its pixels: without a graphics card that
+    is four times as fast as the samples that VTK takes to smooth edges.
+    """
     load()  # for its colour maps
     import pyvista
 
     with pyvista.vtk_verbosity("off"):  # VTK reports a missing display before it does without
-        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size))
+        plotter = pyvista.Plotter(off_screen=off_screen, window_size=[FINER * length for length in size] if frames else list(size))
         try:
             plotter.set_background("white")
-            plotter.enable_anti_aliasing("ssaa")
+            if frames:
+                plotter.render_window.SetMultiSamples(0)
+            else:
+                plotter.enable_anti_aliasing("ssaa")
             yield plotter
         finally:
             plotter.close()
 
 
+def frame(plotter: pyvista.Plotter) -> NDArray[np.uint8]:
+    """The picture of a plotter for frames, shape (height, width, 3)."""
+    from PIL import Image
+
+    plotter.render()
+    fine = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)[..., :3]
+    return np.asarray(Image.fromarray(fine).reduce(FINER))
+
+
 def draw_surface(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, float], size: float) -> None:
-    """Draw a surface, its ends, hubs and a few circles, in place of the one drawn before.
+    """Draw a surface, its ends, hubs and a few circles. Colours span the limits; lines are as thick as suits a membrane of the size."""
+    DrawnMembrane(plotter, limits, size).show(surface)
 
-    Colours span the limits; lines are as thick as suits a membrane of the size.
+
+class DrawnMembrane:
+    """A membrane in a picture: one surface after the other, each in place of the one before.
+
+    Surfaces with as many points share their cells, which are built once: of a movie only points, colours and normals change.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    limits : (float, float)
+        Of the colours.
+    size : float
+        Of the membranes, to which the lines are fitted.
     """
-    import pyvista
 
-    points, revolution = surface.points, surface.revolution
-    mesh = polydata(revolution, points)
-    look: dict[str, Any] = {"show_scalar_bar": False, "name": "membrane", **_STILL, **_MATT}
-    if surface.quantity == "zone":
-        first = np.concatenate([revolution.node[cells].min(axis=1) for cells in (revolution.triangles, revolution.quads)])
-        mesh.cell_data["zone"] = surface.values[first]
-        look |= {"scalars": "zone", "clim": _ZONE_LIMITS, "cmap": list(zone_colors()), "preference": "cell"}
-    else:
-        mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
-        look |= {"scalars": surface.quantity, "clim": limits, "cmap": _MAP}
-    plotter.add_mesh(mesh, **look)
-    ends = [end % surface.rho.size for end in surface.equilibrium.potential.space.edges]
-    tubes = [
-        pyvista.lines_from_points(points[revolution.node == node], close=True).tube(radius=radius * size, n_sides=8)
-        for node, radius in circles(surface.rho, surface.eta, ends)
-    ]
-    if tubes:
-        plotter.add_mesh(pyvista.merge(tubes), color="black", ambient=1.0, diffuse=0.0, name="circles", **_STILL)
-    for k in surface.equilibrium.potential.space.hubs:
-        center, radius = (0.0, 0.0, float(surface.eta[k])), float(surface.rho[k])
-        disc = pyvista.Disc(center=center, inner=0.0, outer=radius, normal=(0, 0, 1), c_res=4 * SECTORS)
-        plotter.add_mesh(disc, color="#9a9a9a", ambient=0.4, diffuse=0.6, name=f"hub {k}", **_STILL)
+    def __init__(self, plotter: pyvista.Plotter, limits: tuple[float, float], size: float) -> None:
+        self._plotter, self._limits, self._size = plotter, limits, size
+        self._mesh: Any = None
+        self._lines: Any = None
+
+    def show(self, surface: Surface) -> None:
+        """Draw a surface, its ends, hubs and a few circles."""
+        points, revolution = surface.points, surface.revolution
+        if self._mesh is None or surface.quantity == "zone" or self._mesh.n_points != len(points):
+            self._mesh = polydata(revolution, points)
+            self._color(surface)
+            actor = self._plotter.add_mesh(self._mesh, name="membrane", show_scalar_bar=False, **self._scale(surface), **_STILL, **_MATT)
+            actor.prop.interpolation = "Gouraud"
+        else:
+            self._mesh.points = points
+            self._color(surface)
+        self._draw_circles(surface)
+        for k in surface.equilibrium.potential.space.hubs:
+            self._draw_hub(f"hub {k}", float(surface.rho[k]), float(surface.eta[k]))
+
+    def _color(self, surface: Surface) -> None:
+        revolution = surface.revolution
+        self._mesh.point_data.active_normals = surface.normals
+        if surface.quantity == "zone":
+            first = np.concatenate([revolution.node[cells].min(axis=1) for cells in (revolution.triangles, revolution.quads)])
+            self._mesh.cell_data["zone"] = surface.values[first]
+        else:
+            self._mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
+
+    def _scale(self, surface: Surface) -> dict[str, Any]:
+        if surface.quantity == "zone":
+            return {"scalars": "zone", "clim": _ZONE_LIMITS, "cmap": list(zone_colors()), "preference": "cell"}
+        return {"scalars": surface.quantity, "clim": self._limits, "cmap": _MAP}
+
+    def _draw_circles(self, surface: Surface) -> None:
+        import pyvista
+
+        ends = [end % surface.rho.size for end in surface.equilibrium.potential.space.edges]
+        shown = circles(surface.rho, surface.eta, ends)
+        points = _rings(np.array([(surface.rho[node], surface.eta[node], radius * self._size) for node, radius in shown]).reshape(-1, 3))
+        if self._lines is not None and self._lines.n_points == len(points):
+            self._lines.points = points
+        elif len(points):
+            self._lines = pyvista.PolyData(points, faces=_ring_faces(len(shown)))
+            self._plotter.add_mesh(self._lines, color="black", ambient=1.0, diffuse=0.0, name="circles", **_STILL)
+
+    def _draw_hub(self, name: str, radius: float, height: float) -> None:
+        import pyvista
+
+        disc = pyvista.Disc(center=(0.0, 0.0, height), inner=0.0, outer=radius, normal=(0, 0, 1), c_res=4 * SECTORS)
+        self._plotter.add_mesh(disc, color="#9a9a9a", ambient=0.4, diffuse=0.6, name=name, **_STILL)
+
+
+#: sides of a thick line, and pieces of a circle
+_SIDES, _PIECES = 6, 2 * SECTORS
+
+
+def _rings(shown: Array) -> Array:
+    """Points on thick circles about the axis, whose radius, height and thickness stand in the rows."""
+    turn, side = 2 * np.pi * np.arange(_PIECES) / _PIECES, 2 * np.pi * np.arange(_SIDES) / _SIDES
+    radius, height, thick = (column[:, None, None] for column in shown.T)
+    rho, z = radius + thick * np.cos(side), height + thick * np.sin(side) + 0 * turn[:, None]
+    x, y = rho * np.cos(turn)[:, None], rho * np.sin(turn)[:, None]
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+
+
+def _ring_faces(count: int) -> NDArray[np.int64]:
+    """The sides of so many thick circles, as four points each."""
+    ring, turn, side = np.ogrid[:count, :_PIECES, :_SIDES]
+
+    def number(turn: NDArray[np.int64], side: NDArray[np.int64]) -> NDArray[np.int64]:
+        return np.asarray((ring * _PIECES + turn % _PIECES) * _SIDES + side % _SIDES)
+
+    corners = [number(turn, side), number(turn + 1, side), number(turn + 1, side + 1), number(turn, side + 1)]
+    return np.stack([np.full_like(corners[0], 4), *corners], axis=-1).ravel()
 
 
 def circles(rho: Array, eta: Array, ends: Sequence[int], count: int = 6) -> list[tuple[int, float]]:
@@ -236,7 +329,7 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
         render=False,
         vertical=True,
         n_labels=0 if zones else 5,
-        fmt="%.3g",
+        fmt=f"%.{_digits(limits)}g",
         color="black",
         title_font_size=round(22 * scale),
         label_font_size=round(20 * scale),
@@ -245,6 +338,12 @@ def draw_key(plotter: pyvista.Plotter, surface: Surface, limits: tuple[float, fl
         position_x=0.9 if zones else 0.85,  # its names stand on the left
         position_y=0.15,
     )
+
+
+def _digits(limits: tuple[float, float]) -> int:
+    """Significant digits that tell the numbers at a scale apart: three, or more where the range is small beside the values."""
+    size, span = max(map(abs, limits)), limits[1] - limits[0]
+    return 3 if not 0 < span < size else int(np.clip(np.ceil(np.log10(size / span)) + 2, 3, 8))
 
 
 def zone_colors() -> tuple[str, ...]:
@@ -261,7 +360,8 @@ def draw_surroundings(plotter: pyvista.Plotter, scene: Scene, box: Box) -> list[
     around, drawn = surroundings(scene, box), []
     for body in around.near:
         for part in _parts(body, 0.1 * box.size):
-            plotter.add_mesh(part, color=_SOURCE, smooth_shading=True, ambient=0.3, **_STILL)
+            look = {"color": "0.6", "opacity": 0.25} if body.rigid else {"color": _SOURCE}
+            plotter.add_mesh(part, smooth_shading=True, ambient=0.3, **look, **_STILL)
             drawn.append(np.asarray(part.points))
     if around.absent:
         corner = tuple(0.03 * length for length in plotter.window_size)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quantities import Units, axis_label, caption
-from .branch_lines import MARKERS, answer, draw_branch
+from .branch_lines import MARKERS, after, answer, draw_branch
 from .figures import (
     AMONG,
     BOTH,
@@ -24,12 +24,15 @@ from .figures import (
     VOLUME_ONLY,
     Style,
     draw_legend,
+    legend_below,
     legend_entries,
     new_figure,
+    save_axes,
     save_figure,
     show_in_notebooks,
     verdict_style,
 )
+from .labels import add_label
 from .meridians import draw_profile, draw_surroundings
 from .zones import fill_zones
 
@@ -39,6 +42,9 @@ if TYPE_CHECKING:
 
     from ..results.branch import Branch
 
+#: inches that a picture needs for a legend beside it
+_WIDE = 5.0
+
 __all__ = [
     "BOTH",
     "MARGINAL",
@@ -47,6 +53,8 @@ __all__ = [
     "UNSTABLE",
     "VOLUME_ONLY",
     "Style",
+    "add_label",
+    "after",
     "answer",
     "draw_branch",
     "draw_legend",
@@ -114,10 +122,7 @@ def plot_branch(
     across = (branch.over or "volume") if x is None else x
     draw_branch(ax, branch, across=across, up=answer(branch) if y is None else y, label=label, units=units)
     draw_legend(ax, _heading(branch) if label is None else None)
-    whole = ax.get_figure(root=True)
-    if whole is not None:
-        save_figure(whole, path)
-    return ax
+    return save_axes(ax, path)
 
 
 def _heading(branch: Branch) -> str | None:
@@ -162,10 +167,13 @@ def plot_profiles(
         named = caption(equilibrium.volume, equilibrium.pressure, ",  ", chosen)
         draw_profile(axes, equilibrium, Style(named, SOLID, color), zones=zones, units=chosen)
     draw_surroundings(axes, shown, chosen)
-    axes.set_anchor("W")  # the legend stands on the right
     handles, labels = legend_entries(axes)
-    look: dict[str, Any] = {"bbox_to_anchor": (1.01, 0.5), "frameon": False, "fontsize": 9, "handlelength": 3.2}
-    axes.legend(handles[::-1], labels[::-1], loc="center left", **look)
+    if figure.get_size_inches()[0] < _WIDE:
+        legend_below(figure, handles, labels)
+    else:
+        axes.set_anchor("W")  # the legend stands on the right
+        look: dict[str, Any] = {"bbox_to_anchor": (1.01, 0.5), "frameon": False, "fontsize": 9, "handlelength": 3.2}
+        axes.legend(handles[::-1], labels[::-1], loc="center left", **look)
     return save_figure(figure, path)
 
 
@@ -189,7 +197,7 @@ def plot_zones(branch: Branch, path: str | PathLike[str] | None = None, *, units
     _require_equilibria(branch)
     figure, axes = new_figure((6.4, 4.2), title=branch.scene.title)
     handles = draw_zones(axes, branch, units=units)
-    figure.legend(handles=handles, loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3.0, handleheight=1.8)
+    legend_below(figure, handles, [handle.get_label() for handle in handles], 2, handlelength=3.0, handleheight=1.8)
     return save_figure(figure, path)
 
 

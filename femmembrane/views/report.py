@@ -186,14 +186,17 @@ class _Page:
         names, over = {kind: name for kind, (_, name) in plots.MARKERS.items()}, [self.branch.over] if self.branch.over else []
         rows = [
             [
-                names.get(str(p.kind), str(p.kind)) + (f", n = {p.azimuthal}" if p.azimuthal else ""),
+                names.get(str(p.kind), str(p.kind))
+                + (f", n = {p.azimuthal}" if p.azimuthal else "")
+                + (f", {word}" if (word := plots.after(p)) else ""),
                 *(p.equilibrium.number(name) for name in over),
                 *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
-        return table(["special point", *over, *(heading_in(name, self.units) for name in PLACES), "relative error"], rows)
+        said = "".join(f"<p>{escape(p.postbuckling.words[:1].upper() + p.postbuckling.words[1:])}.</p>" for p in points if p.azimuthal)
+        return table(["special point", *over, *(heading_in(name, self.units) for name in PLACES), "relative error"], rows) + said
 
     def _jumps(self) -> str:
         names, rows = ("volume", "pressure"), []

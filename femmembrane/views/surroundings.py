@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 #: a source further from the membrane than this many times its size would leave the membrane a speck in the picture
 FAR = 1.5
+#: how far lines of bodies without an end are looked at, in sizes of the membrane, and in how many points each piece
+_REACH, _FINE = 3.0, 241
 #: how far a body without an end reaches beyond the membrane, in sizes of the membrane
 _BEYOND = 0.3
 
@@ -83,6 +85,11 @@ def surroundings(scene: Scene, box: Box) -> Surroundings:
             absent.append(body.label)
         else:
             near.append(body)
+    for obstacle in getattr(scene, "obstacles", ()):
+        parts = [part for part in (_clipped(line, box) for line in obstacle.profile(_REACH * box.size)) if part is not None]
+        if not parts:
+            absent.append(obstacle.label())
+        near += [Outline("" if k else obstacle.label(), part, rigid=True) for k, part in enumerate(parts)]
     return Surroundings(tuple(near), tuple(absent))
 
 
@@ -108,6 +115,21 @@ def place_of(step: int | None, count: int) -> int:
         return count - 1
     allowed = f"a whole number from {-count} to {count - 1} is allowed: negative ones count from the end"
     return whole("step", step, allowed, least=-count, most=count - 1) % count
+
+
+def _clipped(line: Array, box: Box) -> tuple[tuple[float, float], ...] | None:
+    """The part of a profile next to a box; None where there is none."""
+    margin = _BEYOND * box.size
+    fine = np.concatenate([np.linspace(line[:, k], line[:, k + 1], _FINE, axis=1) for k in range(line.shape[1] - 1)], axis=1)
+    rho, z = fine
+    inside = (rho >= 0) & (rho <= box.radius + margin) & (z >= box.low - margin) & (z <= box.high + margin)
+    kept = np.flatnonzero(inside)
+    if kept.size < 2:
+        return None
+    found = fine[:, kept[0] : kept[-1] + 1]
+    if line.shape[1] == 2:
+        found = found[:, [0, -1]]
+    return tuple((float(r), float(h)) for r, h in found.T)
 
 
 def _cut(body: Outline, box: Box) -> Outline:

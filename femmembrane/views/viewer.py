@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..quantities import SCALED, Units, caption, in_si, words
 from ..results.analyses import remarks
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
-from .picture import Surface, aim, check_quantity, draw_key, draw_surface, draw_surroundings, new_plotter
+from .picture import DrawnMembrane, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
 from .surroundings import Box, place_of
 
 if TYPE_CHECKING:
@@ -27,8 +27,12 @@ if TYPE_CHECKING:
     from ..results.branch import Branch
     from ..results.equilibrium import Equilibrium
 
-#: sizes of a window and a picture, and of a movie; its frames take a quarter of a second each without a graphics card
+#: who is told of each frame of a movie: its number, counted from 1, and how many there are
+OnFrame: TypeAlias = Callable[[int, int], object]
+#: sizes of a window and a picture, and of a movie
 SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
+#: sectors and points along a meridian of a surface of which many are shown: it is round to a third of a pixel
+SECTORS_SHOWN, POINTS_SHOWN = 72, 73
 #: most frames of a movie of a branch, and frames of one period of a mode
 _MOST, _PERIOD = 90, 30
 _RATE = 12.0
@@ -48,6 +52,7 @@ def view(
     movie: str | PathLike[str] | None = None,
     size: tuple[int, int] | None = None,
     units: str = "scaled",
+    on_frame: OnFrame | None = None,
 ) -> None:
     """Show the membrane in space: in a window, or in files and without a display if files are asked for.
 
@@ -70,6 +75,8 @@ def view(
         Width and height in pixels. Default: (1200, 900), for a movie (720, 540).
     units : {"scaled", "si"}
         Of the numbers beside the membrane and of stresses: those of the package, or SI units by the scales of the scene.
+    on_frame : callable, optional
+        Called with (number, total) after each frame of a movie.
 
     Raises
     ------
@@ -91,7 +98,7 @@ def view(
     if screenshot is None and movie is None:
         _check_display()
     if mode is not None:
-        _view_mode(branch[place], mode, screenshot, movie, size)
+        _view_mode(branch[place], mode, screenshot, movie, size, on_frame)
         return
     if screenshot is not None:
         with replace_file(_png(screenshot)) as temporary, new_plotter(size or SIZE) as plotter:
@@ -99,9 +106,9 @@ def view(
             plotter.screenshot(str(temporary))
     if movie is not None:
         chosen = np.unique(np.linspace(0, len(branch) - 1, min(len(branch), _MOST)).round().astype(int)).tolist()
-        with new_plotter(size or MOVIE_SIZE) as plotter:
+        with new_plotter(size or MOVIE_SIZE, frames=True) as plotter:
             stage = _Stage(plotter, [branch[k] for k in chosen], chosen, len(branch), color, chosen_units)
-            write_movie(_frames(stage), movie, rate=_RATE, hold=_HOLD)
+            write_movie(_told(_frames(stage), len(chosen), on_frame), movie, rate=_RATE, hold=_HOLD)
     if screenshot is None and movie is None:
         with new_plotter(size or SIZE, off_screen=False) as plotter:
             open_steps(plotter, branch, color, place, chosen_units)
@@ -139,28 +146,31 @@ class _Stage:
     units: Units = SCALED
 
     def __post_init__(self) -> None:
-        self.surfaces = [Surface.of(equilibrium, self.color, sectors=96) for equilibrium in self.branch]
+        self.surfaces = [Surface.of(equilibrium, self.color, SECTORS_SHOWN, POINTS_SHOWN) for equilibrium in self.branch]
         self.limits = min(s.range[0] for s in self.surfaces), max(s.range[1] for s in self.surfaces)
         box = Box.of([{"rho": s.rho, "eta": s.eta} for s in self.surfaces])
-        self.extent = box.size
+        self.membrane = DrawnMembrane(self.plotter, self.limits, box.size)
         drawn = draw_surroundings(self.plotter, self.branch[0].scene, box)
         draw_key(self.plotter, self.surfaces[0], self.limits)
         aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11)
 
     def draw(self, index: int) -> None:
-        draw_surface(self.plotter, self.surfaces[index], self.limits, self.extent)
+        self.membrane.show(self.surfaces[index])
         write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total, self.units))
 
 
 def _frames(stage: _Stage) -> Iterator[Frame]:
     for index in range(len(stage.surfaces)):
         stage.draw(index)
-        yield _frame(stage.plotter)
+        yield frame(stage.plotter)
 
 
-def _frame(plotter: pyvista.Plotter) -> Frame:
-    plotter.render()
-    return np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)[..., :3]
+def _told(frames: Iterator[Frame], total: int, on_frame: OnFrame | None) -> Iterator[Frame]:
+    """The same frames; whoever waits for them is told of each."""
+    for number, drawn in enumerate(frames, 1):
+        if on_frame is not None:
+            on_frame(number, total)
+        yield drawn
 
 
 def write_caption(plotter: pyvista.Plotter, text: str) -> None:
@@ -184,14 +194,15 @@ def _view_mode(
     screenshot: str | PathLike[str] | None,
     movie: str | PathLike[str] | None,
     size: tuple[int, int] | None,
+    on_frame: OnFrame | None,
 ) -> None:
     found = equilibrium.frequencies(azimuthal=waves, count=1)[0]
     if screenshot is not None:
         render_mode(equilibrium, found, _png(screenshot), size=size or (1500, 700))
     surface = ModeSurface(equilibrium, found, None, sectors=96)
     if movie is not None:
-        with new_plotter(size or MOVIE_SIZE) as plotter:
-            write_movie(_phases(plotter, surface), movie, rate=2 * _RATE)
+        with new_plotter(size or MOVIE_SIZE, frames=True) as plotter:
+            write_movie(_told(_phases(plotter, surface), _PERIOD, on_frame), movie, rate=2 * _RATE)
     if screenshot is None and movie is None:
         with new_plotter(size or SIZE, off_screen=False) as plotter:
             set_in_motion(plotter, surface)
@@ -212,9 +223,9 @@ def set_in_motion(plotter: pyvista.Plotter, surface: ModeSurface) -> None:
 
 def _phases(plotter: pyvista.Plotter, surface: ModeSurface) -> Iterator[Frame]:
     set_up_motion(plotter, surface)
-    for frame in range(_PERIOD):
-        draw_moved(plotter, surface, float(np.cos(2 * np.pi * frame / _PERIOD)))
-        yield _frame(plotter)
+    for tick in range(_PERIOD):
+        draw_moved(plotter, surface, float(np.cos(2 * np.pi * tick / _PERIOD)))
+        yield frame(plotter)
 
 
 def _png(path: str | PathLike[str]) -> str | PathLike[str]:

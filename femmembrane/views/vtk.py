@@ -161,15 +161,29 @@ def remove_surfaces(path: Path, keep: int = 0) -> None:
             file.unlink()
 
 
-def smooth_profile(equilibrium: Equilibrium, points: int = 0) -> dict[str, Array]:
+def spread(equilibrium: Equilibrium, count: int) -> Array:
+    """So many places along the meridian, spread like its nodes, so that layers show: for any number of nodes."""
+    nodes = equilibrium.potential.space.node_parameters()
+    return np.interp(np.linspace(0, nodes.size - 1, count), np.arange(nodes.size), nodes)
+
+
+def smooth_profile(equilibrium: Equilibrium, points: int = 0, most: int | None = None) -> dict[str, Array]:
     """The profile at the nodes. A value that is not defined on the axis (0/0) is taken from the node beside it.
 
-    With fewer nodes than ``points`` it is taken at that many places instead, so that the curvature of long elements shows.
+    With fewer nodes than ``points`` it is taken at that many places instead, so that the curvature of long elements shows; with more than
+    ``most``, at ``most`` places that are spread like the nodes.
     """
     found = equilibrium.profile()
+    if most is not None and found["r"].size > most:
+        found = equilibrium.profile(spread(equilibrium, most))
     if found["r"].size < points:
         s = equilibrium.potential.space.node_parameters()
         found = equilibrium.profile(np.linspace(s[0], s[-1], points))
+    return finite_at_ends(found)
+
+
+def finite_at_ends(found: Mapping[str, Array]) -> dict[str, Array]:
+    """A profile in which a value that is not defined on the axis (0/0) is that of the place beside it."""
     profile = {key: np.array(values, dtype=np.float64) for key, values in found.items()}
     for values in profile.values():
         for end, beside in ((0, 1), (-1, -2)):

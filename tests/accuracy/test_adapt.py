@@ -405,7 +405,9 @@ def test_command(tmp_path, capfd):
     path, out = tmp_path / "scene.toml", tmp_path / "out"
     path.write_text(SCENE.format(run="start = 0.5\nstop = 5.0\nsteps = 4"), encoding="utf-8")
     assert main(["run", str(path), "--out", str(out)]) == 0
-    assert capfd.readouterr() == ("", "")
+    said = capfd.readouterr()
+    assert "written:" in said.out
+    assert said.err == ""
     with (out / "branch.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert max(float(row["error_pressure"]) for row in rows) < 1e-7

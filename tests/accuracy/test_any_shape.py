@@ -126,3 +126,14 @@ def test_accuracies_that_are_refused(given, key, text):
         fm.sphere(accuracy=given)
     assert caught.value.key == key
     assert text in str(caught.value)
+
+
+@pytest.mark.parametrize("mesh", [fm.cylinder(3.0, accuracy=1e-5), fm.meridian_from_points([(1.0, 0.5), (1.0, -0.5)], accuracy=1e-5)])
+def test_a_trace_of_a_shape_whose_first_end_is_held(mesh):
+    """No height is compared where none moves; the limit point of a tube, against the same mesh with finer elements."""
+    branch = fm.trace(fm.Scene(OGDEN, mesh), start=1.2 * np.pi * (3.0 if mesh.shape == "cylinder" else 1.0), max_steps=12)
+    assert len(branch) == 13
+    assert branch.scene.mesh.estimated < 1e-5
+    chosen, last = branch.scene, branch[-1]
+    fine = chosen.replace(mesh=chosen.mesh.on_ends(chosen.mesh.breakpoints()).refined(), degree=chosen.degree + 2)
+    assert last.pressure == pytest.approx(fm.equilibrium(fine, volume=last.volume, start=None).pressure, rel=1e-5)

@@ -201,10 +201,10 @@ def main(tmp_path):
     return cli.main(["run", str(DEMO), "--out", str(tmp_path)])
 
 
-def test_done_in_silence(stand_in, tmp_path, capsys):
+def test_done_in_a_pipe_says_what_was_written(stand_in, tmp_path, capsys):
     written = stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 3)))
     assert main(tmp_path) == cli.DONE
-    assert capsys.readouterr() == ("", "")
+    assert capsys.readouterr() == (f"3 equilibria, written:\n  {tmp_path}/branch.csv\n", "")
     assert len(written) == 1
     assert written[0].scene == Scene.from_toml(DEMO)
 
@@ -225,7 +225,7 @@ def test_progress_on_a_terminal(stand_in, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     assert cli.main(["run", str(plain), "--out", str(tmp_path)]) == cli.DONE
     said = capsys.readouterr()
-    assert said.out == ""
+    assert said.out == "3 equilibria, written:\n"
     assert "3/60" in said.err
     assert "P = 1.5" in said.err
 
@@ -325,6 +325,22 @@ def test_interrupt_while_writing_waits_for_the_files(stand_in, tmp_path, capsys)
     assert main(tmp_path) == cli.INTERRUPTED
     assert len(ended) == 1
     assert "2 equilibria" in capsys.readouterr().err
+
+
+def test_a_second_interrupt_while_writing_says_what_is_there(stand_in, tmp_path, capfd):
+    """The first one is acknowledged at once."""
+
+    def write(branch, directory, *, command=None, units="scaled"):
+        interrupt()
+        interrupt()
+        return []
+
+    stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 2)), write)
+    assert main(tmp_path) == cli.INTERRUPTED
+    said = capfd.readouterr().err
+    assert "finished first" in said
+    assert "some are missing" in said
+    assert "nothing was written" not in said
 
 
 def test_disk_full(stand_in, tmp_path, capsys):

@@ -38,11 +38,13 @@ def table(path: Path) -> list[dict[str, str]]:
 
 
 def test_volume_run_writes_every_file(tmp_path, capfd):
-    """The README's job on a small mesh and few steps: exit code 0, nothing printed in a pipe."""
+    """The README's job on a small mesh and few steps: exit code 0, and in a pipe what was written."""
     run = '[[source]]\nkind = "dipole"\nstrength = 200\nheight = 6.5\n[run]\nstart = 0.5\nstop = 75.0\nsteps = 6\n'
     path = scene_file(tmp_path, run + '[analysis]\nstability = ["pressure", "volume"]\n')
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
-    assert capfd.readouterr() == ("", "")
+    said = capfd.readouterr()
+    assert "written:" in said.out
+    assert said.err == ""
     out = tmp_path / "out"
     rows = table(out / "branch.csv")
     expected = "step volume pressure center_height elastic_energy magnetic_energy lambda_pressure lambda_volume verdict_pressure"
@@ -105,9 +107,10 @@ def test_jump_goes_on(tmp_path):
 
 
 def test_as_a_command_in_a_pipe(tmp_path):
-    """A real process: the module runs, nothing is printed, warnings would be errors."""
+    """A real process: the module runs and says what it wrote, warnings would be errors."""
     path = scene_file(tmp_path, "[run]\nvalues = [1.0]\n")
     command = [sys.executable, "-W", "error", "-m", "femmembrane", "run", str(path), "--out", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONWARNINGS": "error"}, timeout=300)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("1 equilibrium, written:\n")
     assert len(table(tmp_path / "out" / "branch.csv")) == 1

@@ -59,7 +59,9 @@ def next_to_the_limit(share: float) -> float:
 
 
 @FAMILY.case(
-    "tension field, no slack state any more", "beyond phi^2 = 0.4725 a slack film has no width", Stop(fm.Status.NOT_CONVERGED, "voltage")
+    "tension field, no slack state any more",
+    "beyond phi^2 = 0.4725 a slack film has no width",
+    Stop(fm.Status.NO_EQUILIBRIUM, "voltage could not be turned on"),
 )
 def slack_beyond_pull_in() -> fm.Equilibrium:
     return fm.equilibrium(under(DISC.replace(tension_field=True), voltage=0.75), volume=0.1)

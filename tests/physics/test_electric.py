@@ -339,6 +339,8 @@ def test_units():
         ({"voltage": 0.3, "to": 1.5}, "electric.to"),
         ({"voltage": 0.3, "from": -0.1}, "electric.from"),
         ({"voltage": 0.3, "from": 1.0}, "electric.from"),
+        ({"voltage": 0.3, "from": 0.5, "to": 0.5 + 1e-13}, "electric.to"),
+        ({"total_charge": 0.3, "from": 1 - 1e-13}, "electric.from"),
         ({"voltage": 0.3, "breakdown": 0.0}, "electric.breakdown"),
         ({"voltage": 0.3, "relative_permittivity": -4.7}, "electric.relative_permittivity"),
         ({"voltage": 5e3, "relative_permittivity": 4.7}, "electric.relative_permittivity"),

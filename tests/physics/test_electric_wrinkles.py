@@ -114,3 +114,26 @@ def test_branch():
     held = fm.equilibrium(scene.replace(electric=fm.Electric(total_charge=eq.charge)), volume=at)
     assert (held.pressure, held.voltage) == pytest.approx((eq.pressure, 0.3), rel=1e-7)
     assert all(eq.verdict(azimuthal=n).stable for n in (1, 2))
+
+
+def test_cold_start_under_a_high_voltage():
+    """Much of the film is wrinkled there; the same state as along the branch over the voltage."""
+    scene = DISC.replace(mesh=fm.disc(12), electric=fm.Electric(voltage=0.0))
+    phi = np.sqrt(0.38)
+    branch = fm.trace(scene, over="electric.voltage", hold={"volume": 0.9}, until={"electric.voltage": phi}, max_steps=100)
+    cold = fm.equilibrium(scene.replace(electric=fm.Electric(voltage=phi)), volume=0.9)
+    assert cold.pressure == pytest.approx(branch[-1].pressure, rel=1e-8)
+    assert cold.verdict("pressure").stable
+
+
+@pytest.mark.parametrize("electric", [{"voltage": 0.5}, {"total_charge": 1.5}], ids=str)
+@pytest.mark.parametrize("tension_field", [False, True])
+def test_rate_of_the_forces_while_a_voltage_is_turned_on(electric, tension_field):
+    """By central differences; it is no difference of the whole where forces are not linear in the squared voltage."""
+    scene = DISC.replace(electric=fm.Electric(**electric), tension_field=tension_field)
+    potential, h = potential_of(scene), 1e-4
+    r = potential.space.interpolation_points()
+    x = potential.space.interpolate(-0.35 * r * (1 - r**2), 0.3 * (1 - r**4))
+    a, at, b = (potential.evaluate(x, 0.3, 0.6 + k * h) for k in (-1, 0, 1))
+    found = potential.factor_derivative(at, 0.3, 0.6)
+    np.testing.assert_allclose(found, (b.gradient - a.gradient) / (2 * h), rtol=0, atol=1e-4 * np.abs(found).max())

@@ -451,3 +451,13 @@ def test_pictures(tmp_path):
     assert marks == [[[1.5, 3.0]], [[-1.5, 3.0]]]
     fm.render(branch, tmp_path / "membrane.png", size=(300, 200))
     assert (tmp_path / "membrane.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("answer", [(1.0, 2.0), (1.0, 2.0, 3.0, 4.0), 1.0])
+def test_a_field_of_ones_own_with_other_than_three_components_is_named(answer: object) -> None:
+    class Own(fm.Source):
+        def field(self, rho, eta):
+            return answer
+
+    with pytest.raises(fm.InputError, match=r"Own.*three components"):
+        fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(4), sources=[Own()], susceptibility=1.0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -219,3 +221,10 @@ def test_states_between_have_the_electric_energy() -> None:
     assert solved.electric_energy < 0
     for refine in (False, True):
         assert branch.at(volume=1.2, refine=refine).electric_energy == pytest.approx(solved.electric_energy, rel=1e-4)
+
+
+def test_a_branch_that_was_drawn_goes_to_other_processes() -> None:
+    branch = fm.trace(SCENE, start=0.5, until={"center_height": 1.0})
+    between = branch.at(volume=0.8)
+    for copied in (pickle.loads(pickle.dumps(branch)), copy.deepcopy(branch)):
+        assert copied.at(volume=0.8).pressure == between.pressure

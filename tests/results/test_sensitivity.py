@@ -289,6 +289,15 @@ def test_electric_quantities(electric: fm.Electric) -> None:
     along_numbers(scene, names(scene), answer, {name: np.array([found[q][name] for q in of]) for name in names(scene)})
 
 
+def test_electrodes_without_a_voltage() -> None:
+    """Q = C(V) phi, where C does not change with the sign of phi."""
+    eq = solved(fm.Scene(fm.MooneyRivlin(0.1), DISC, electric=fm.Electric(voltage=0.0)), {"volume": 1.0})
+    found = eq.sensitivity(["charge", "capacitance", "electric_energy"], "electric.voltage", held="volume")
+    assert found["charge"] == pytest.approx(eq.capacitance, rel=1e-8)
+    assert abs(found["capacitance"]) < 1e-6 * eq.capacitance
+    assert abs(found["electric_energy"]) < 1e-6
+
+
 def test_a_sphere_against_its_closed_form() -> None:
     """P = sum 2 mu_k (l^(alpha_k - 3) - l^(-2 alpha_k - 3)) at the stretch l = (3 V/(4 pi))^(1/3): E = 4 pi W(l), P = E'/V'."""
     rubber = fm.Ogden(mu=(1.4, -0.1), alpha=(1.3, -1.8))
@@ -355,8 +364,16 @@ def test_what_has_no_derivative_is_refused() -> None:
         assert error.value.key == key
     with pytest.raises(fm.InputError, match="did you mean 'pressure'"):
         eq.sensitivity("volume", "material.ratio", held="pressur")
+    with pytest.raises(fm.InputError, match="known: center_height, gas"):
+        eq.sensitivity("volume", "material.ratio", held=["pressure"])  # type: ignore[arg-type]
+    for places in ("middle", [[0.1, 0.2]], [0.1, None]):
+        with pytest.raises(fm.InputError, match="reference radii in"):
+            eq.sensitivity("eta", "material.ratio", r=places)  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="no gas holds"):
         eq.sensitivity("volume", "material.ratio", held="gas")
+    tube = solved(fm.Scene(fm.MooneyRivlin(0.1), fm.cylinder(3.0, 8)), {"volume": 11.0})
+    with pytest.raises(fm.InputError, match="held along the axis"):
+        tube.sensitivity("volume", "material.ratio", held="center_height")
     with pytest.raises(fm.InputError, match="fixed by the unit of stress"):
         solved(fm.Scene(fm.Ogden((1.25,), (1.6,)), DISC), {"volume": 1.0}).sensitivity("pressure", "material.mu.0")
 
@@ -450,7 +467,7 @@ def test_a_scale_of_a_scene_without_units_is_unknown() -> None:
 
 
 def test_wrinkles_that_come_and_go() -> None:
-    """In a tube that is wrinkled in part slopes change where the border of the wrinkles passes a quadrature point: a small step sees none."""
+    """In a tube that is wrinkled in part slopes change where the border passes a quadrature point: a small step sees none."""
     scene = fm.Scene(fm.Gent(30.0), fm.Cylinder(length=2.0, elements=16), tension_field=True)
     eq = solved(scene, {"volume": 5.5})
     parameter, h = Parameter(scene, "membrane.prestretch"), 1e-5

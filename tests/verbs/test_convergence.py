@@ -305,7 +305,9 @@ def test_command(tmp_path, capfd, run, control, load):
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(SCENE + run + "\n", encoding="utf-8")
     assert cli.main(["convergence", str(scene), "--out", str(out), "--degrees", "1,2", "--elements", "8,16,32"]) == cli.DONE
-    assert capfd.readouterr() == ("", "")
+    said = capfd.readouterr()
+    assert "written:" in said.out
+    assert said.err == ""
     assert {path.name for path in out.iterdir()} == {"convergence.csv", "convergence.png"}
     with (out / "convergence.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -345,11 +345,14 @@ def test_load_without_a_run():
         asked_load(SCENE)
 
 
-def test_command(tmp_path, silent):
-    """Two files, and not a word in a pipe."""
+def test_command(tmp_path, capfd):
+    """Two files, and in a pipe the study."""
     path = tmp_path / "scene.toml"
     path.write_text(f"{HEAD}[run]\nvalues = [1.0, 2.0]\n", encoding="utf-8")
     assert main(["cost", str(path), "--out", str(tmp_path / "out"), "--quick"]) == 0
+    said = capfd.readouterr()
+    assert said.out.strip()
+    assert said.err == ""
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"cost.csv", "cost.png"}
     with (tmp_path / "out" / "cost.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -142,7 +142,9 @@ def test_command_and_option(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     assert not (out / "report.html").exists()
     assert main(["report", str(out / "branch.nc")]) == 0
     assert "versions" not in Page((out / "report.html").read_text(encoding="utf-8")).ids
-    assert capfd.readouterr() == ("", "")
+    said = capfd.readouterr()
+    assert "written:" in said.out
+    assert said.err == ""
     assert main(["report", str(scene)]) == 2
     assert main(["report", str(tmp_path)]) == 2
 

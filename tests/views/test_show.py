@@ -176,3 +176,42 @@ def test_nothing_to_show(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
         fm.view(dataclasses.replace(branch(), equilibria=()))
     assert main(["view", str(tmp_path / "none")]) == 2
     assert "folder of a run" in capfd.readouterr().err
+
+
+def test_a_movie_tells_of_its_frames_and_moves_one_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cells of the surface are built once, however many frames there are."""
+    told: list[tuple[int, int]] = []
+    built: list[int] = []
+    original = picture.polydata
+    monkeypatch.setattr(picture, "polydata", lambda *a: built.append(1) or original(*a))
+    fm.view(branch(), movie=tmp_path / "a.gif", size=SMALL, on_frame=lambda number, total: told.append((number, total)))
+    assert told == [(k + 1, len(branch())) for k in range(len(branch()))]
+    assert len(built) == 1
+    told.clear()
+    fm.view(branch(), mode=0, step=0, movie=tmp_path / "b.gif", size=SMALL, on_frame=lambda number, total: told.append((number, total)))
+    assert told[-1] == (30, 30)
+
+
+def test_frames_are_as_large_as_asked_and_white_outside(tmp_path: Path) -> None:
+    """A frame is the mean of a finer picture: edges are smooth, the paper stays white."""
+    with picture.new_plotter(SMALL, frames=True) as plotter:
+        surface = picture.Surface.of(branch()[-1], "stretch_2")
+        picture.draw_surface(plotter, surface, surface.range, surface.box.size)
+        picture.aim(plotter, surface.points)
+        found = picture.frame(plotter)
+    assert found.shape == (SMALL[1], SMALL[0], 3)
+    assert (found[0] == 255).all()
+    assert (found.min(axis=2) < 200).mean() > 0.05
+
+
+def test_normals_of_a_sphere_point_along_the_radius() -> None:
+    sphere = fm.equilibrium(fm.Scene(material=fm.MooneyRivlin(ratio=0.1), mesh=fm.sphere(elements=16)), pressure=0.3)
+    surface = picture.Surface.of(sphere, "stretch_1")
+    centred = surface.points - [0, 0, surface.points[:, 2].mean()]
+    radial = centred / np.linalg.norm(centred, axis=1)[:, None]
+    assert np.abs((surface.normals * radial).sum(axis=1)).min() > 0.99
+
+
+@pytest.mark.parametrize(("limits", "digits"), [((0.0, 7.65), 3), ((0.993, 1.004), 4), ((1.0, 1.00002), 7), ((2.0, 2.0), 3)])
+def test_numbers_at_a_scale_differ(limits: tuple[float, float], digits: int) -> None:
+    assert picture._digits(limits) == digits

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, unknown_name
 from ...quantities import Quantity, heading, quantity, typed
 from .base import EquilibriumAnalysis, PrintedColumn, Remark
+from .contact import ContactWithBodies
 from .electrics import Electrics
 from .error_estimates import ErrorEstimates
 from .si_columns import SIColumns
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _VERDICTS = Verdicts()
 #: those that a scene asks for by keys of their own, in the order of their columns
-ANALYSES: tuple[EquilibriumAnalysis, ...] = (_VERDICTS, Electrics(), SIColumns(), WrinkledZones(), ErrorEstimates())
+ANALYSES: tuple[EquilibriumAnalysis, ...] = (_VERDICTS, Electrics(), SIColumns(), WrinkledZones(), ErrorEstimates(), ContactWithBodies())
 #: those that a scene asks for by name, in ``analysis.extra``
 EXTRA: dict[str, EquilibriumAnalysis] = {}
 

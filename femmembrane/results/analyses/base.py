@@ -79,6 +79,10 @@ class EquilibriumAnalysis:
         """Names of columns of ``special_points.csv``."""
         return ()
 
+    def found_columns(self, points: Sequence[SpecialPoint]) -> Sequence[str]:
+        """Names of columns of ``special_points.csv`` that the points found ask for, after those of :meth:`point_columns`."""
+        return ()
+
     def point_value(self, point: SpecialPoint, column: str) -> Cell:
         """One cell of a column of special points: the attribute of that name."""
         found: Cell = getattr(point, column)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...quantities import axis_label, heading, typed
-from ...scene import VERDICTS, Perturbations
+from ...scene import ALL, VERDICTS, Perturbations
 from .. import door
 from ..verdict import Verdict
 from .base import Array, Cell, Curves, EquilibriumAnalysis, PrintedColumn, Remark, Section, Table, Variable
@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from ...scene import Scene
     from ..branch import Branch
     from ..equilibrium import Equilibrium
+    from ..special_point import SpecialPoint
 
 #: controls whose verdicts are printed of a scene that asks for none
 _PRINTED = ("pressure", "volume")
-_COLUMN = re.compile(rf"(lambda|verdict)_(?:({'|'.join(VERDICTS)})|n([1-9]\d*))")
+_COLUMN = re.compile(rf"(lambda|verdict)_(?:({'|'.join(VERDICTS)})|n([1-9]\d*)|(all))|waves_all")
 _STABLE = {"stable": True, "unstable": False, "marginal": None}
 #: in place of a number of negative directions that was not determined
 _UNCOUNTED = -1
@@ -42,7 +43,7 @@ class Verdicts(EquilibriumAnalysis):
         """Started from the modes of the equilibrium before, with the factors that the evaluation has."""
         potential, state = evaluation.potential, (equilibrium.state, equilibrium.pressure, evaluation)
         for p in equilibrium.scene.analysis.verdicts:
-            guess = None if before is None else _verdict(before, p).coefficients
+            guess = None if before is None or p.azimuthal == ALL else _verdict(before, p).coefficients
             enclosed = equilibrium.enclosed if p.control == "gas" else None
             compliance = enclosed.compliance(equilibrium.volume) if enclosed else None
             ask = partial(door.checked_verdict, potential, *state, p.control, p.azimuthal, guess=guess, compliance=compliance)
@@ -52,7 +53,8 @@ class Verdicts(EquilibriumAnalysis):
 
     def columns(self, scene: Scene) -> Sequence[str]:
         controls = [control for control in VERDICTS if control in scene.analysis.stability]
-        waves = (f"lambda_{p.tag}" for p in scene.analysis.verdicts if p.azimuthal)
+        waves = [f"lambda_{p.tag}" for p in scene.analysis.verdicts if p.azimuthal]
+        waves += ["waves_all"] if ALL in scene.analysis.azimuthal_modes else []
         return (*(f"lambda_{c}" for c in controls), *(f"verdict_{c}" for c in controls), *waves)
 
     def more_columns(self) -> Sequence[str]:
@@ -63,19 +65,33 @@ class Verdicts(EquilibriumAnalysis):
         return _COLUMN.fullmatch(column) is not None
 
     def value(self, equilibrium: Equilibrium, column: str) -> Cell:
-        kind, control, waves = _COLUMN.fullmatch(column).groups()  # type: ignore[union-attr]
-        verdict = _verdict(equilibrium, Perturbations(control, int(waves or 0)))
+        kind, control, waves, worst = _COLUMN.fullmatch(column).groups()  # type: ignore[union-attr]
+        if kind is None:
+            return _verdict(equilibrium, Perturbations(None, ALL)).azimuthal
+        verdict = _verdict(equilibrium, Perturbations(control, worst or int(waves or 0)))
         return verdict.word if kind == "verdict" else float(verdict.smallest_eigenvalue)
 
     def point_columns(self, scene: Scene) -> Sequence[str]:
         return ("azimuthal",) if scene.analysis.azimuthal_modes else ()
+
+    def found_columns(self, points: Sequence[SpecialPoint]) -> Sequence[str]:
+        return ("postbuckling", "postbuckling_coefficient") if any(point.azimuthal for point in points) else ()
+
+    def point_value(self, point: SpecialPoint, column: str) -> Cell:
+        """Of other points than azimuthal onsets there is nothing after."""
+        if column == "azimuthal":
+            return point.azimuthal
+        after = point.postbuckling if point.azimuthal else None
+        if column == "postbuckling":
+            return after.kind if after else ""
+        return after.coefficient if after else np.nan
 
     # --- files
 
     def variables(self, branch: Branch) -> Mapping[str, Variable]:
         found: dict[str, Variable] = {}
         for p in branch.scene.analysis.verdicts:
-            found |= _variables(p.tag, [_verdict(equilibrium, p) for equilibrium in branch])
+            found |= _variables(p.tag, [_verdict(equilibrium, p) for equilibrium in branch], branch.scene.bending)
         return found
 
     def restore(self, dataset: xarray.Dataset, branch: Branch) -> None:
@@ -131,16 +147,20 @@ def _verdict(equilibrium: Equilibrium, against: Perturbations) -> Verdict:
     return equilibrium.verdict(against.control, azimuthal=against.azimuthal)
 
 
-def _variables(tag: str, verdicts: Sequence[Verdict]) -> dict[str, Variable]:
-    """All of the verdicts of one class that the columns leave out, and :func:`_stored` needs to build them again."""
+def _variables(tag: str, verdicts: Sequence[Verdict], bending: bool) -> dict[str, Variable]:
+    """All of the verdicts of one class that the columns leave out, and :func:`_stored` needs to build them again. The modes of the worst
+    numbers of waves, which differ, are left out.
+    """
     numbers: dict[str, Sequence[Any]] = {
         f"verdict_{tag}": [v.word for v in verdicts],
         f"lambda_error_{tag}": [v.error for v in verdicts],
         f"negative_directions_{tag}": [_UNCOUNTED if v.negative_directions is None else v.negative_directions for v in verdicts],
         f"reason_{tag}": [v.reason for v in verdicts],
     }
+    if bending:
+        numbers[f"wavelength_{tag}"] = [v.wavelength for v in verdicts]
     variables: dict[str, Variable] = {name: (("step",), typed(name, values)) for name, values in numbers.items()}
-    shapes = [_shape(v) for v in verdicts]
+    shapes = [] if tag == ALL else [_shape(v) for v in verdicts]
     for key, known in next((s for s in shapes if s), {}).items():
         dimension = f"coefficient_{tag}" if key == "coefficients" else "node"
         variables[f"mode_{tag}_{key}"] = (("step", dimension), np.array([s.get(key, np.full_like(known, np.nan)) for s in shapes]))
@@ -168,11 +188,12 @@ def _stored(dataset: xarray.Dataset, against: Perturbations) -> Iterator[Verdict
             smallest_eigenvalue=float(dataset[f"lambda_{tag}"].values[k]),
             error=float(dataset[f"lambda_error_{tag}"].values[k]),
             control=against.control,
-            azimuthal=against.azimuthal,
+            azimuthal=int(dataset["waves_all"].values[k]) if against.azimuthal == ALL else int(against.azimuthal),
             negative_directions=None if count == _UNCOUNTED else count,
             reason=str(dataset[f"reason_{tag}"].values[k]),
             coefficients=coefficients if known else None,
             _shape=partial(_stored_shape, mode) if known else None,
+            wavelength=float(dataset[f"wavelength_{tag}"].values[k]) if f"wavelength_{tag}" in dataset else np.nan,
         )
 
 

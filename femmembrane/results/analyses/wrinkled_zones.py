@@ -74,8 +74,10 @@ class WrinkledZones(EquilibriumAnalysis):
 
     def section(self, branch: Branch) -> Section:
         runs = [steps for _, steps in stretches([", ".join(e.zones().kinds) for e in branch])]
-        shown = [step for steps in runs for step in dict.fromkeys((steps[0], steps[-1]))][:_MOST_ROWS]
+        wrinkled = 1 - branch.column("fraction_taut")
+        ends = [dict.fromkeys(sorted((steps[0], steps[int(np.argmax(wrinkled[steps]))], steps[-1]))) for steps in runs]
+        shown = [step for steps in ends for step in steps][:_MOST_ROWS]
         rows = [[step, branch[step].volume, branch[step].zones().summary] for step in shown]
-        caption = "First and last step with the same kinds of zones, and their parts of the reference area"
+        caption = "First and last step with the same kinds of zones and the one with most wrinkles, and parts of the reference area"
         table = Table(["step", heading("volume"), "zones"], rows, caption)
         return Section("Zones", Drawing("Taut and wrinkled zones", door.draw_zones), table)

@@ -1,0 +1,387 @@
+"""Which nodes rigid bodies hold, and where contact begins and ends.
+
+On a set of held nodes equilibrium is a smooth problem, solved as any other. The next set follows from its solution
+(:meth:`.ContactPotential.judged`): a node that has come into a body is held, one that the body would have to pull is let go. This is a
+semismooth Newton method, which ends after a few sets. Where sets would repeat, one node at a time changes, the worst one first.
+
+The border of contact then lies between two nodes. The curvature of the membrane jumps there, so that a mesh with the border inside an
+element has no more than second order. So the nearest end of an element is moved to the border. A border is in its place where the membrane
+leaves the body along the tangent: the forces of the element beyond it have no part along the normal. That is one scalar equation for each
+border, solved by Broyden's method. Its forces converge at twice the order of the elements, as those of a support do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+import numpy as np
+
+from ..errors import Status
+from ..physics.loads import over_projection
+from ..potential import Array, Potential
+from .controls import ArcLengthControl, CarriedArcLength, Control
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactEvaluation, ContactPotential, Mask
+    from .continuation import BranchPoint
+    from .newton import NewtonResult
+    from .segment import Located, Segment
+
+#: sets of held nodes that are tried
+MOST_SETS = 60
+#: times that borders are moved
+_MOST_MOVES = 25
+#: distance of a border from its place, over the size of an element, at which it has arrived
+_ARRIVED = 1e-9
+#: force across a border, over the largest that meet at a node, that is round-off
+_BALANCED = 1e-13
+#: least share of an element that a border leaves of it
+_LEAST = 0.1
+#: elements in a zone of contact from which on its borders are followed
+_FEWEST = 2
+#: times that borders are given to other ends of elements, and that zones of a few nodes change; elements beside a followed zone that
+#: belong to it
+_MOST_PASSES, _NEXT = 8, 2
+#: how far beyond the middle between two ends a border may be, over the size of an element, before the other one follows it
+_BEYOND = 0.02
+#: forces that pull, over the largest, and gaps inside a body, over the size of the membrane, that a border in its place may leave
+_PULL, _INSIDE = 1e-3, 1e-6
+
+
+class Once(Protocol):
+    """A corrector on a smooth potential."""
+
+    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult: ...
+
+
+def settled(once: Once, control: Control, potential: Potential, x: Array, pressure: float, magnetic: float) -> NewtonResult:
+    """Where a corrector ends with the nodes held that are held there, and with ends of elements at the borders of contact.
+
+    Parameters
+    ----------
+    once : callable
+        The corrector on a fixed set.
+    control : Control
+        Of coefficients on the mesh of the scene.
+    potential : Potential
+        With bodies.
+    x, pressure : ndarray, float
+        Guess.
+    magnetic : float
+        Factor on the magnetic energy.
+    """
+    given = cast("ContactPotential", potential)
+    x = np.ascontiguousarray(x, dtype=float)
+    root, x = given.root, given.carried(x)
+    result = _on_mesh(once, control, root, x, pressure, magnetic)
+    followed = _with_borders(once, control, root, result) if result.status is Status.CONVERGED else None
+    if followed is None:
+        return result
+    followed.x = followed.evaluation.carried(followed.x)
+    return followed
+
+
+def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pressure: float, magnetic: float) -> NewtonResult:
+    """The equilibrium on the mesh of the scene."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        held = root.pressed(x, pressure, magnetic)
+    tried: set[bytes] = set()
+    spent = 0
+    while True:
+        tried.add(held.tobytes())
+        result = once(root.holding(held), control=control, x=x, pressure=pressure)
+        spent += result.iterations
+        result.iterations = spent
+        if result.status is not Status.CONVERGED:
+            return result
+        evaluation = cast("ContactEvaluation", result.evaluation)
+        following = root.judged(evaluation._raw, evaluation.gaps, result.pressure)
+        if (following == held).all():
+            return result
+        if following.tobytes() in tried:
+            following = _one_changed(evaluation, held, following)
+        if len(tried) == MOST_SETS or following.tobytes() in tried:
+            result.status = Status.NOT_CONVERGED
+            return result
+        x, pressure, held = result.x, result.pressure, following
+
+
+def _one_changed(evaluation: ContactEvaluation, held: Mask, following: Mask) -> Mask:
+    """A set with one node changed: that which is deepest in a body, or else that which a body pulls most."""
+    changed = np.flatnonzero(following != held)
+    entering = changed[~held[changed]]
+    worst = entering[evaluation.gaps.gap[entering].argmin()] if entering.size else changed[evaluation.forces[changed].argmin()]
+    new = held.copy()
+    new[worst] = not held[worst]
+    return new
+
+
+@dataclass(frozen=True)
+class Border:
+    """A place where contact begins or ends: the number of the end of elements that follows it, and whether contact is before or behind."""
+
+    end: int
+    before: bool
+
+
+def _with_borders(once: Once, control: Control, root: ContactPotential, result: NewtonResult) -> NewtonResult | None:
+    """The equilibrium with ends of elements at the borders of contact; None where there are none that ends could follow."""
+    evaluation = cast("ContactEvaluation", result.evaluation)
+    zones = [(zone, np.array(_estimates(root, evaluation, zone))) for zone in zones_of(root, evaluation.held)]
+    followed = [(zone, places) for zone, places in zones if places.size and _assigned(root, [zone], places) is not None]
+    if not followed or _assigned(root, [z for z, _ in followed], np.concatenate([s for _, s in followed])) is None:
+        return None
+    own, places = [zone for zone, _ in followed], np.concatenate([s for _, s in followed])
+    # other zones, of a node or two, stay as sets of nodes
+    loose = evaluation.held & ~_within(root, own)
+    spent, x, pressure = result.iterations, result.x, result.pressure
+    for _ in range(_MOST_PASSES):
+        borders = _assigned(root, own, places)
+        if borders is None:
+            return None
+        found = _moved(once, control, root, loose, own, borders, places, x, pressure)
+        if found is None:
+            return None
+        result, places = found
+        spent += result.iterations
+        result.iterations = spent
+        evaluation = cast("ContactEvaluation", result.evaluation)
+        potential = cast("ContactPotential", evaluation.potential)
+        following = potential.judged(evaluation._raw, evaluation.gaps, result.pressure) & ~_within(root, own, _NEXT * root.space.degree)
+        again = _assigned(root, own, places)
+        same = again is None or all(a == b or _between(root, a, b, s) for a, b, s in zip(again, borders, places, strict=True))
+        if same and (following == loose).all():
+            return result if _in_place(evaluation) else None
+        x, pressure, loose = evaluation.carried(result.x), result.pressure, following
+    return None
+
+
+def _within(root: ContactPotential, zones: list[tuple[int, int]], margin: int = 0) -> Mask:
+    """The nodes in zones, and so many beside them."""
+    found = np.zeros(root.nodes.size, dtype=bool)
+    for first, last in zones:
+        found |= (root.nodes >= first - margin) & (root.nodes <= last + margin)
+    return found
+
+
+def zones_of(root: ContactPotential, held: Mask) -> list[tuple[int, int]]:
+    """First and last nodes along the meridian of each zone of contact."""
+    at = root.nodes[held]
+    if not at.size:
+        return []
+    breaks = np.flatnonzero(np.diff(at) > 1)
+    return list(zip(at[np.append(0, breaks + 1)].tolist(), at[np.append(breaks, at.size - 1)].tolist(), strict=True))
+
+
+def _sides(root: ContactPotential, zone: tuple[int, int]) -> list[bool]:
+    """The borders of a zone: False for that at its beginning, True for that at its end; an end of the meridian is none."""
+    known = set(root.nodes.tolist())
+    return [side for side, beyond in ((False, zone[0] - 1), (True, zone[1] + 1)) if beyond in known]
+
+
+def _estimates(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> list[float]:
+    """Where the gap, which grows as a square beyond a border, would be zero."""
+    place = {int(node): k for k, node in enumerate(root.nodes)}
+    found = []
+    for side in _sides(root, zone):
+        edge, step = (zone[1], 1) if side else (zone[0], -1)
+        s0, s1 = (root.parameters[place[edge + j * step]] for j in (0, 1))
+        s = (s0 + s1) / 2
+        if edge + 2 * step in place:
+            one, two = (place[edge + j * step] for j in (1, 2))
+            g1, g2 = (np.sqrt(max(float(evaluation.gaps.gap[k]), 0.0)) for k in (one, two))
+            if g2 > g1:
+                s2 = root.parameters[two]
+                s = float(np.clip(s1 - (s2 - s1) * g1 / (g2 - g1), *sorted((s0 - 0.5 * (s1 - s0), s1))))
+        found.append(float(s))
+    return found
+
+
+def _assigned(root: ContactPotential, zones: list[tuple[int, int]], places: Array) -> list[Border] | None:
+    """The ends of elements that follow borders at places; None where one of them has no end of its own."""
+    ends = root.space.ends
+    borders: list[Border] = []
+    k = 0
+    for zone in zones:
+        sides = _sides(root, zone)
+        own = places[k : k + len(sides)]
+        k += len(sides)
+        if len(sides) == 2 and not own[0] < own[1]:
+            return None
+        numbers = [int(np.abs(ends - s).argmin()) for s in own]
+        first = numbers[0] if sides[0] is False else 0
+        last = numbers[-1] if sides[-1] else ends.size - 1
+        if last - first < _FEWEST:  # the membrane about so small a zone is not resolved, wherever the ends are
+            return None
+        borders += [Border(number, side) for number, side in zip(numbers, sides, strict=True)]
+    taken = [border.end for border in borders]
+    if len(set(taken)) < len(taken) or not all(0 < number < ends.size - 1 and root.movable[number] for number in taken):
+        return None
+    moved = ends.copy()
+    moved[taken] = places
+    return borders if (np.diff(moved) >= _LEAST * np.diff(ends)).all() else None
+
+
+def _between(root: ContactPotential, one: Border, other: Border, place: float) -> bool:
+    """Whether a place is next to the middle between two ends, so that either may follow it."""
+    ends = root.space.ends
+    a, b = ends[one.end], ends[other.end]
+    return bool(abs(abs(place - a) - abs(place - b)) <= 2 * _BEYOND * abs(a - b))
+
+
+def _moved(
+    once: Once,
+    control: Control,
+    root: ContactPotential,
+    loose: Mask,
+    zones: list[tuple[int, int]],
+    borders: list[Border],
+    places: Array,
+    x: Array,
+    pressure: float,
+) -> tuple[NewtonResult, Array] | None:
+    """The equilibrium with the borders in their places, and these; None where that was not found."""
+    ends, degree = root.space.ends, root.space.degree
+    sizes = np.array([min(ends[b.end] - ends[b.end - 1], ends[b.end + 1] - ends[b.end]) for b in borders])
+    low = np.array([ends[b.end - 1] for b in borders]) + _LEAST * sizes
+    high = np.array([ends[b.end + 1] for b in borders]) - _LEAST * sizes
+    inside = _held_nodes(root, zones, borders, degree) | loose
+    spent = 0
+
+    def solved(at: Array) -> tuple[NewtonResult, Array] | None:
+        nonlocal spent, x, pressure
+        there = root.bordered(tuple((b.end, float(s)) for b, s in zip(borders, at, strict=True)))
+        result = once(there.holding(inside), control=on_borders(control, there), x=there.from_root @ x, pressure=pressure)
+        spent += result.iterations
+        if result.status is not Status.CONVERGED:
+            return None
+        x, pressure = result.evaluation.carried(result.x), result.pressure
+        return result, _across(result, borders, inside)
+
+    places = np.clip(places, low, high)
+    found = solved(places)
+    if found is None:
+        return None
+    result, force = found
+    step = np.where(places + 0.01 * sizes < high, 0.01, -0.01) * sizes
+    jacobian: Array | None = None
+    for _ in range(_MOST_MOVES):
+        if (np.abs(force) <= _BALANCED).all():
+            break
+        if jacobian is not None:
+            step = -np.linalg.solve(jacobian, force)
+            step = np.clip(step, -0.5 * sizes, 0.5 * sizes)
+        following = np.clip(places + step, low, high)
+        step = following - places
+        if (np.abs(step) <= _ARRIVED * sizes).all():
+            break
+        found = solved(following)
+        if found is None:
+            return None
+        result, change, force = found[0], found[1] - force, found[1]
+        places = following
+        if jacobian is None:
+            jacobian = np.diag(change / step)
+        elif (step @ step) > 0:
+            jacobian = jacobian + np.outer(change - jacobian @ step, step / sizes**2) / (step / sizes**2 @ step)
+        if not np.isfinite(jacobian).all() or np.linalg.matrix_rank(jacobian) < len(places):
+            return None
+    else:
+        return None
+    result.iterations = spent
+    return result, places
+
+
+def _held_nodes(root: ContactPotential, zones: list[tuple[int, int]], borders: list[Border], degree: int) -> Mask:
+    """The nodes that are held when ends of elements are at the borders of zones."""
+    held = np.zeros(root.nodes.size, dtype=bool)
+    left = list(borders)
+    for first, last in zones:
+        for side in _sides(root, (first, last)):
+            border = left.pop(0)
+            first, last = (first, border.end * degree) if side else (border.end * degree, last)
+        held |= (root.nodes >= first) & (root.nodes <= last)
+    return held
+
+
+def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
+    """Forces along the normal of the elements beyond the borders, over the largest forces that meet at a node."""
+    evaluation = cast("ContactEvaluation", result.evaluation)
+    potential, space = cast("ContactPotential", evaluation.potential), evaluation.potential.space
+    density = evaluation.force_density.reshape(2, 4 * space.n_quadrature, space.n_elements)
+    scales = evaluation.force_scale(result.pressure)
+    found = []
+    for border in borders:
+        element, local = (border.end, 0) if border.before else (border.end - 1, space.degree)
+        forces = space.table.T @ (density[0][:, element] - result.pressure * density[1][:, element])
+        node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
+        n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
+        along, across = _at_end(potential, evaluation, result.pressure, border)
+        scale = abs(n_rho) * scales[0] + abs(n_eta) * scales[1]
+        found.append(((forces[local] - along) * n_rho + (forces[space.degree + 1 + local] - across) * n_eta) / scale)
+    return np.array(found)
+
+
+def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure: float, border: Border) -> tuple[float, float]:
+    """What the forms of the volume, and of loads over the projected area, have at the end of an element beside the force over it.
+
+    They count the volume below an element, or beside it, so that its variation has a part at its ends. Two neighbours' parts cancel.
+    """
+    space = potential.space
+    rho, eta = space.end_position(evaluation.x, border.end)
+    turn = 2 * np.pi * space.side * (-1.0 if border.before else 1.0)  # the element beyond the border begins, or ends, there
+    load = evaluation.factor * float(over_projection(potential.loads, np.array(eta))[0]) if potential.loads else 0.0
+    if space.lids:
+        return turn * load * rho, turn * pressure * rho**2 / 2
+    return turn * (load - pressure * eta) * rho, 0.0
+
+
+def _in_place(evaluation: ContactEvaluation) -> bool:
+    """Whether bodies push at all held nodes, and no other is inside one."""
+    potential = cast("ContactPotential", evaluation.potential)
+    forces = potential.with_poles(evaluation.forces)[evaluation.held]
+    free = evaluation.gaps.gap[~evaluation.held]
+    inside = -_INSIDE * potential.space.unit
+    return bool(forces.min(initial=0.0) >= -_PULL * forces.max(initial=0.0) and free.min(initial=0.0) >= inside)
+
+
+def on_borders(control: Control, potential: ContactPotential) -> Control:
+    """A control of coefficients on the mesh of the scene as one of those on a mesh that follows borders."""
+    if not isinstance(control, ArcLengthControl) or not potential.borders:
+        return control
+    offset = float(control.dual @ control.prediction)
+    return CarriedArcLength(
+        np.asarray(control.dual @ potential.to_root), control.dual_pressure, control.prediction, control.predicted_pressure, offset
+    )
+
+
+def contact_events(segment: Segment[Any]) -> list[Located[Any]]:
+    """The points of a segment where a body is touched first, or let go last.
+
+    There the force on the body is zero, and the least gap before: one function, negative before the touch and positive after it, has its
+    root there.
+    """
+    potential = segment.problem.potential
+    if segment.leaving or not potential.obstacles:
+        return []
+    found = []
+    for k in range(len(potential.obstacles)):
+
+        def pressed(point: BranchPoint, k: int = k) -> float:
+            return _pressed(point.state.evaluation, k)
+
+        before, after = pressed(segment.a), pressed(segment.b)
+        if before * after < 0 or (after == 0 and before != 0):
+            found.append(segment.root("touch" if after > before else "release", pressed, 0.0, 1.0))
+    return found
+
+
+def _pressed(evaluation: Any, body: int) -> float:
+    """The force on a body, or less its least gap where it is not touched."""
+    own = evaluation.gaps.body == body
+    held = evaluation.held & own
+    if held.any():
+        return float(np.abs(evaluation.forces[held]).sum())
+    rho, eta = evaluation.potential.positions(evaluation.x)
+    return -float(evaluation.potential.obstacles[body].gap(rho, eta).min())

@@ -1,0 +1,72 @@
+"""An independent solver for a neo-Hookean disc below a rigid, frictionless plate: shooting from the border of contact.
+
+Nothing of the package is used. Against the plate the membrane is flat and stretched alike in both directions, by l0: there is no friction,
+and a disc under a uniform tension is in balance. From the border, at the reference radius A and the deformed radius a = l0 A, with the
+horizontal and vertical force of the meridian over the angle 1, F_rho and F_z,
+
+    F_rho' = W_2 - P rho l1 sin(phi),     F_z = -P (rho^2 - a^2)/2,     (rho', eta') = l1 (F_rho, F_z)/|F|,     W_1(l1, l2) = |F|/R,
+
+with l2 = rho/R. The unknowns P and l0 follow from the rim, rho(1) = 1 and eta(1) = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+
+class Plate(NamedTuple):
+    """A state: pressure, volume, stretch in contact, reference radius of its border."""
+
+    pressure: float
+    volume: float
+    stretch: float
+    reference_radius: float
+
+
+def _stretch(tension: float, l2: float) -> float:
+    """l1 with l1 - 1/(l1^3 l2^2) = W_1."""
+    l1 = max(tension, 1.0)
+    for _ in range(60):
+        step = (l1 - 1 / (l1**3 * l2**2) - tension) / (1 + 3 / (l1**4 * l2**2))
+        l1 -= step
+        if abs(step) < 1e-15 * l1:
+            break
+    return l1
+
+
+def under_plate(height: float, radius: float, guess: tuple[float, float]) -> Plate:
+    """The state with a deformed radius of contact, from a guess of pressure and stretch."""
+
+    def integrated(pressure: float, stretch: float):
+        A = radius / stretch
+
+        def rates(R, y):
+            rho, _, f_rho, _ = y
+            f_z = -pressure * (rho**2 - radius**2) / 2
+            force = math.hypot(f_rho, f_z)
+            l1, l2 = _stretch(force / R, rho / R), rho / R
+            cosine, sine = f_rho / force, f_z / force
+            return [l1 * cosine, l1 * sine, l2 - 1 / (l1**2 * l2**3) + pressure * rho * l1 * sine, l1 * cosine * rho]
+
+        start = [radius, height, A * (stretch - stretch**-5), 0.0]
+
+        def with_volume(R, y):
+            rates_ = rates(R, y)
+            return [*rates_[:3], 2 * math.pi * y[0] * rates_[0] * y[1]]
+
+        start[3] = math.pi * radius**2 * height
+        return A, solve_ivp(with_volume, (A, 1.0), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+    def missed(unknown):
+        _, end = integrated(*unknown)
+        return [end[0] - 1.0, end[1]]
+
+    pressure, stretch = fsolve(missed, guess, xtol=1e-13)
+    A, end = integrated(pressure, stretch)
+    assert np.abs(missed((pressure, stretch))).max() < 1e-9
+    return Plate(float(pressure), float(end[3]), float(stretch), A)

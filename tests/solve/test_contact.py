@@ -1,0 +1,364 @@
+"""Contact with rigid bodies: references, orders, solvers, branches, and hard cases.
+
+References for the neo-Hookean disc under a frictionless plate: tests/contact_shooting.py, and nine digits of another shooting code.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import femmembrane as fm
+from femmembrane.potential import potential_of
+from femmembrane.potential.potential import Potential
+from femmembrane.solve import active_set
+from femmembrane.solve.controls import PressureControl, VolumeControl
+from femmembrane.solve.minimize import minimize
+from femmembrane.solve.newton import correct
+
+from ..contact_shooting import under_plate
+
+NH = fm.NeoHookean()
+#: (P, V, deformed radius of contact) with the plate at 0.5
+AT_03, AT_05 = (1.309893716, 1.054478791, 0.3), (1.987275565, 1.248855708, 0.5)
+
+
+def plate(height=0.5, elements=64, degree=2, **more):
+    return fm.Scene(material=NH, mesh=fm.disc(elements), degree=degree, obstacles=[fm.Plane(height=height)], **more)
+
+
+def test_the_shooting_code_agrees_with_the_nine_digits_of_another():
+    found = under_plate(0.5, 0.3, (1.3, 1.2))
+    assert found.pressure == pytest.approx(AT_03[0], abs=1e-9)
+    assert found.volume == pytest.approx(AT_03[1], abs=1e-9)
+    assert found.stretch == pytest.approx(1.219705477, abs=1e-9)
+    assert found.reference_radius == pytest.approx(0.245961017, abs=1e-9)
+    assert under_plate(0.5, 0.5, (2.0, 1.3)).pressure == pytest.approx(AT_05[0], abs=3e-9)
+
+
+@pytest.mark.parametrize(("degree", "elements", "within"), [(2, 64, 2e-7), (4, 24, 2e-9)])
+def test_disc_under_a_plate(degree, elements, within):
+    """P, V, radii and stretch of two states, and the force pi a^2 P."""
+    scene = plate(elements=elements, degree=degree)
+    for pressure, volume, radius in (AT_03, AT_05):
+        eq = fm.equilibrium(scene, volume=volume)
+        contact = eq.contact
+        assert eq.pressure == pytest.approx(pressure, abs=within + 2e-9)
+        assert contact.radius == pytest.approx(radius, abs=within + 2e-9)
+        assert contact.force == pytest.approx(np.pi * contact.radius**2 * eq.pressure, rel=1e-9)
+        assert contact.pressure([0.0, 0.1, 0.2]) == pytest.approx([eq.pressure] * 3, rel=1e-8)
+        known = under_plate(0.5, radius, (pressure, 1.3))
+        assert contact.reference_radius == pytest.approx(known.reference_radius, abs=within + 2e-9)
+        assert eq.profile([0.1])["stretch_1"] == pytest.approx(known.stretch, abs=within + 2e-9)
+        assert eq.profile([0.1])["stretch_2"] == pytest.approx(known.stretch, abs=within + 2e-9)
+
+
+def errors_of(elements):
+    return [fm.equilibrium(plate(elements=n), volume=AT_05[1]).pressure - AT_05[0] for n in elements]
+
+
+def test_ends_of_elements_that_follow_the_border_keep_the_order(monkeypatch):
+    """Order 4 with elements of degree 2. On a mesh that stays the error falls as the square at best, and is a thousand times larger."""
+    followed = errors_of((8, 16, 32))
+    orders = np.log2(np.abs(followed[:-1])) - np.log2(np.abs(followed[1:]))
+    assert (orders > 3.6).all()
+    assert (orders < 4.4).all()
+    monkeypatch.setattr(active_set, "_with_borders", lambda *given: None)
+    stays = errors_of((32, 64))
+    assert min(abs(e) for e in stays) > 20 * abs(followed[-1])
+
+
+def test_first_touch_is_located():
+    """P and V of the touch by another shooting code; afterwards the branch goes on in contact."""
+    branch = fm.trace(plate(elements=32, degree=3), start=0.6, until={"volume": 1.0})
+    touch = next(p for p in branch.special_points if p.kind == "touch")
+    assert touch.pressure == pytest.approx(0.900638437, abs=2e-8)
+    assert touch.volume == pytest.approx(0.888015530, abs=2e-8)
+    assert touch.equilibrium.center_height == pytest.approx(0.5, abs=1e-12)
+    assert branch[-1].contact.touching
+    assert not branch[0].contact.touching
+
+
+def test_the_limit_point_moves_in_contact():
+    """With the plate at 1 it is touched at P = 1.839932401, before the limit point of the bare disc at 1.879, which moves to about 2.54."""
+    branch = fm.trace(plate(1.0), start=2.0, until={"volume": 6.5})
+    kinds = {p.kind: p for p in branch.special_points}
+    assert [p.kind for p in branch.special_points] == ["touch", "limit_point"]
+    assert kinds["touch"].pressure == pytest.approx(1.839932401, abs=1e-7)
+    assert kinds["touch"].volume == pytest.approx(2.188132842, abs=1e-6)
+    fold = kinds["limit_point"].equilibrium
+    radius = fold.contact.radius
+    known = [under_plate(1.0, radius + d, (fold.pressure, 2.0)).pressure for d in (-0.01, 0.0, 0.01)]
+    assert kinds["limit_point"].pressure == pytest.approx(known[1], abs=1e-6)
+    assert fold.pressure == pytest.approx(2.5769, abs=1e-3)  # recorded on 2026-11-28, and by the shooting above
+
+
+def test_release_under_falling_pressure():
+    """Back down the same branch: released where it was touched."""
+    down = fm.trace(plate(elements=32), start=1.0, direction=-1, until={"volume": 0.6})
+    up = fm.trace(plate(elements=32), start=0.6, until={"volume": 1.0})
+    release, touch = (next(p for p in b.special_points if p.kind == k) for b, k in ((down, "release"), (up, "touch")))
+    assert release.pressure == pytest.approx(touch.pressure, abs=1e-9)
+    assert [p.kind for p in down.special_points] == ["release"]
+    loads = fm.pressurize(plate(elements=32), pressures=[0.8, 1.2, 0.8])
+    assert loads[0].volume == pytest.approx(loads[2].volume, rel=1e-11)
+
+
+BODIES = {
+    "plane": fm.Plane(0.5),
+    "ball": fm.Ball(height=1.0, radius=0.5),
+    "cylinder": fm.CylinderObstacle(height=0.6, radius=0.4, length=0.4, rounding=0.12),
+    "mould": fm.Mould([(1.3, -0.2), (1.3, 0.4), (0.2, 0.7), (0.0, 0.7)], rounding=0.1),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_minimiser_and_corrector_agree(name):
+    """IPOPT with inequalities on the mesh of the scene finds what the sets of held nodes end with, under both controls."""
+    scene = fm.Scene(material=NH, mesh=fm.disc(24), obstacles=[BODIES[name]])
+    eq = fm.equilibrium(scene, volume=1.5)
+    assert eq.contact.touching
+    potential = potential_of(scene)
+    for control in (VolumeControl(1.5), PressureControl(eq.pressure)):
+        found, pressure, _, status = minimize(potential, control, eq.potential.carried(eq.state), eq.pressure)
+        assert status == "Solve_Succeeded"
+        on_mesh = active_set._on_mesh
+        result = on_mesh(once(control), control, potential, eq.potential.carried(eq.state), eq.pressure, 1.0)
+        energy = potential.evaluate(found, pressure).energy - pressure * potential.evaluate(found, pressure).volume
+        own = result.evaluation.energy - result.pressure * result.evaluation.volume
+        assert energy == pytest.approx(own, rel=1e-9)
+        assert pressure == pytest.approx(result.pressure, rel=1e-7)
+        assert np.abs(found - result.x).max() < 1e-6
+    by = {solver: fm.equilibrium(scene, volume=1.5, solver=solver) for solver in ("ipopt", "newton")}
+    assert by["ipopt"].pressure == pytest.approx(by["newton"].pressure, rel=1e-9)
+    assert by["ipopt"].contact.radius == pytest.approx(by["newton"].contact.radius, rel=1e-9)
+
+
+def once(control):
+    from functools import partial
+
+    from femmembrane.solve.newton import _corrected
+
+    return partial(_corrected, magnetic=1.0, damped=False, tolerance=1e-10, max_iterations=20)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_state_in_contact_is_one(name):
+    """Forces balance, bodies push and never pull, no point is inside one, and the energy is stationary: dE = P dV."""
+    scene = fm.Scene(material=NH, mesh=fm.disc(48), obstacles=[BODIES[name]])
+    eq = fm.equilibrium(scene, volume=1.5)
+    contact = eq.contact
+    assert eq.residual < 1e-9
+    assert contact.gap().min() >= -1e-9
+    assert contact.pressure().min() >= 0
+    before, after = (fm.equilibrium(scene, volume=1.5 + d, start=eq) for d in (-1e-4, 1e-4))
+    assert (after.energy - before.energy) / 2e-4 == pytest.approx(eq.pressure, rel=1e-5)
+
+
+def test_the_force_is_that_of_moving_the_body():
+    """-dE/dH at a volume: the force with which the plate holds the membrane."""
+    low, eq, high = (fm.equilibrium(plate(h, elements=32), volume=1.1) for h in (0.4999, 0.5, 0.5001))
+    assert -(high.energy - low.energy) / 2e-4 == pytest.approx(eq.contact.force, rel=1e-5)
+
+
+def test_verdicts_are_those_of_the_membrane_beyond_the_contact():
+    """A disc in contact is stiffer; n >= 1 waves leave the plate alone. Eigenvalues converge, and frequencies are their roots."""
+    coarse, fine = (fm.equilibrium(plate(elements=n), volume=1.1) for n in (32, 64))
+    bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(32)), volume=1.1)
+    for ask in ({"control": "pressure"}, {"control": "volume"}, {"azimuthal": 1}, {"azimuthal": 2}):
+        one, other = (eq.verdict(**ask).smallest_eigenvalue for eq in (coarse, fine))
+        assert one == pytest.approx(other, rel=1e-3)
+        assert one > bare.verdict(**ask).smallest_eigenvalue * (1 if "control" in ask else 0.9)
+    assert coarse.frequencies(count=1)[0].eigenvalue == pytest.approx(coarse.verdict("pressure").smallest_eigenvalue, rel=1e-8)
+    assert coarse.verdict("pressure").stable
+    mode = coarse.verdict("pressure").mode
+    assert np.abs(mode["w"][mode["r"] < coarse.contact.reference_radius - 0.05]).max() < 1e-12
+
+
+def test_a_branch_in_contact_comes_back_from_a_file(tmp_path):
+    branch = fm.trace(plate(elements=16), start=0.7, until={"volume": 1.1})
+    branch.save(tmp_path / "branch.nc")
+    again = fm.load(tmp_path / "branch.nc")
+    for name in ("pressure", "contact_radius", "contact_force", "least_gap"):
+        np.testing.assert_array_equal(again.column(name), branch.column(name))
+    assert again.special_points[0].kind == "touch"
+    assert again[-1].verdict("pressure").smallest_eigenvalue == branch[-1].verdict("pressure").smallest_eigenvalue
+    further = fm.trace(branch.scene, start=branch, until={"volume": 1.2})
+    assert further[-1].pressure == pytest.approx(fm.equilibrium(branch.scene, volume=1.2).pressure, rel=1e-9)
+
+
+def test_without_a_body_nothing_is_built():
+    bare = fm.Scene(material=NH, mesh=fm.disc(8))
+    potential = potential_of(bare)
+    assert type(potential) is Potential
+    eq = fm.equilibrium(bare, volume=1.0)
+    assert eq.contact is None
+    assert not {"gap", "contact_pressure"} & set(eq.profile())
+    branch = fm.inflate(bare, volumes=[0.5, 1.0])
+    assert not [name for name in branch.to_dataframe().columns if "contact" in name or "gap" in name]
+    assert potential_of(plate(elements=8)).operations == potential.operations
+
+
+def test_between_two_equilibria_of_a_branch():
+    """With a body every state between two others is solved for."""
+    branch = fm.inflate(plate(elements=24), volumes=[0.7, 0.95, 1.1, 1.3])
+    for volume in (0.8, 1.0, 1.2):
+        between = branch.at(volume=volume)
+        assert between.pressure == pytest.approx(fm.equilibrium(branch.scene, volume=volume).pressure, rel=1e-9)
+    assert len(branch.resample(9)) == 9
+
+
+@pytest.mark.parametrize(
+    ("key", "make"),
+    [
+        ("obstacle", lambda: plate(-0.1, elements=4).replace(obstacles=[fm.Plane(-0.1), fm.Plane(0.0)])),
+        ("obstacle", lambda: plate(0.0, elements=4)),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Ball(height=0.2, radius=0.3)])),
+        ("obstacle.radius", lambda: fm.Ball(height=1.0, radius=0.0)),
+        ("obstacle.length", lambda: fm.CylinderObstacle(height=1.0, radius=0.5, length=0.0)),
+        ("obstacle.rounding", lambda: fm.CylinderObstacle(height=1.0, radius=0.5, length=1.0, rounding=0.6)),
+        ("obstacle.points", lambda: fm.Mould([(0.0, 1.0), (0.0, 1.0)])),
+        ("obstacle.points", lambda: fm.Mould([(0.0, 1.0)])),
+        ("obstacle.side", lambda: fm.Plane(0.5, side="left")),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Plane(0.5), fm.Ball(height=0.7, radius=0.3)])),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=3)),
+        ("obstacle", lambda: plate(elements=4).replace(obstacles=[3])),
+        ("effects.tension_field", lambda: plate(elements=4, tension_field=True)),
+        ("mesh.accuracy", lambda: fm.Scene(material=NH, mesh=fm.disc(accuracy=1e-3), obstacles=[fm.Plane(0.5)])),
+        ("over", lambda: fm.vary(plate(elements=4), "material.alpha", [1.0], hold={"pressure": 0.0})),
+    ],
+)
+def test_bad_input(key, make):
+    with pytest.raises(fm.InputError) as error:
+        make()
+    assert error.value.key.startswith(key)
+
+
+def test_scene_files(tmp_path):
+    """Obstacles go to a file and back; a mould may have its points in a file of its own, and finds its side."""
+    (tmp_path / "bottle.txt").write_text("# rho z\n1.3, -0.2\n1.3; 0.4\n0.2 0.7\n0 0.7\n", encoding="utf-8")
+    text = """
+[material]
+model = "neo-hookean"
+[mesh]
+elements = 8
+[[obstacle]]
+kind = "mould"
+file = "bottle.txt"
+rounding = 0.1
+[[obstacle]]
+kind = "plane"
+height = -2.0
+side = "above"
+"""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    scene = fm.Scene.from_toml(tmp_path / "scene.toml")
+    assert scene.obstacles[0] == fm.Mould([(1.3, -0.2), (1.3, 0.4), (0.2, 0.7), (0.0, 0.7)], rounding=0.1, side="left")
+    scene.to_toml(tmp_path / "again.toml")
+    assert fm.Scene.from_toml(tmp_path / "again.toml") == scene
+
+
+# --- hard cases
+
+
+def test_touch_at_the_pole_exactly():
+    """At the volume of the first touch: held by no force, or away by round-off."""
+    branch = fm.trace(plate(elements=32), start=0.6, until={"volume": 1.0})
+    touch = next(p for p in branch.special_points if p.kind == "touch")
+    eq = fm.equilibrium(plate(elements=32), volume=touch.volume)
+    assert eq.pressure == pytest.approx(touch.pressure, rel=1e-8)
+    assert abs(eq.contact.force) < 1e-8
+
+
+def test_contact_everywhere():
+    """A sphere blown into a mould that is a sphere: every node is held, the border is none, and the pressure is what the stretch leaves."""
+    half, edges = np.pi / 16, np.arange(8)
+    corners = [(1.2 / np.cos(half) * np.sin(half + 2 * half * k), 1.2 / np.cos(half) * np.cos(half + 2 * half * k)) for k in edges]
+    mould = fm.Mould([(0.0, 1.2), *corners, (0.0, -1.2)], rounding=1.2)  # straight pieces without length: a round mould
+    scene = fm.Scene(material=NH, mesh=fm.sphere(24), obstacles=[mould])
+    eq = fm.equilibrium(scene, pressure=3.0)
+    stretch = np.median(eq.profile()["stretch_1"])
+    assert stretch == pytest.approx(1.2, abs=1e-3)
+    assert eq.contact.area == pytest.approx(4 * np.pi * 1.2**2, rel=1e-3)
+    free = 2 * (1 / 1.2 - 1.2**-7)
+    assert np.median(eq.contact.pressure()) == pytest.approx(3.0 - free, rel=2e-2)
+
+
+def test_obstacle_at_the_height_of_the_limit_point():
+    """The pole of the bare disc at its limit point touches the plate just there: a fold in a corner of the branch."""
+    bare = fm.trace(fm.Scene(material=NH, mesh=fm.disc(32)), start=1.0, until={"volume": 4.0})
+    fold = next(p for p in bare.special_points if p.kind == "limit_point")
+    branch = fm.trace(plate(fold.center_height, elements=32), start=1.0, until={"volume": 6.0})
+    kinds = [p.kind for p in branch.special_points]
+    assert "touch" in kinds
+    touch = branch.special_points[kinds.index("touch")]
+    assert touch.pressure == pytest.approx(fold.pressure, rel=1e-9)
+    assert branch.status is fm.Status.CONVERGED
+
+
+def test_a_plate_next_to_a_membrane_at_rest():
+    """At 1e-12 the law of a nearly flat disc holds until it touches: P = 3.3367 V^3, and w(0) is in proportion to V."""
+    near = plate(1e-12, elements=16)
+    branch = fm.trace(near, start=1e-12, until={"volume": 2.2e-12})
+    touch = next(p for p in branch.special_points if p.kind == "touch")
+    assert touch.pressure == pytest.approx(3.3367 * touch.volume**3, rel=1e-3)
+    assert touch.equilibrium.center_height == pytest.approx(1e-12, rel=1e-9)
+    scaled = fm.trace(plate(1e-6, elements=16), start=1e-6, until={"volume": 2.2e-6})
+    assert branch[-1].contact.radius == pytest.approx(scaled[-1].contact.radius, rel=1e-6)
+
+
+def test_contact_and_dipole_together():
+    """A dipole behind the plate pulls the membrane against it; without a pressure the force is the dipole's alone."""
+    dipole = {"sources": [fm.Dipole(strength=2.0, height=2.0)], "susceptibility": 1.0}
+    free = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(32), **dipole), pressure=0.3)
+    eq = fm.equilibrium(plate(0.25, elements=32, **dipole), pressure=0.3)
+    assert free.center_height > 0.3
+    assert eq.center_height == pytest.approx(0.25, abs=1e-12)
+    stretch = eq.profile([0.0])["stretch_1"][0]
+    # at the pole of a flat membrane the field alone presses beside P: -d/dz (-chi/2 |h|^2) with |h|^2 = 4 M/(z - h)^6, over stretch^2
+    field = 12 * 2.0 / (2.0 - 0.25) ** 7 / stretch**2
+    assert eq.contact.pressure([0.0])[0] == pytest.approx(0.3 + field, rel=1e-3)
+
+
+@pytest.mark.parametrize("elements", [10, pytest.param(10_000, marks=pytest.mark.slow), 100])
+def test_few_and_many_elements(elements):
+    result = fm.equilibrium(plate(elements=elements), volume=AT_03[1])
+    assert result.pressure == pytest.approx(AT_03[0], abs=2.0 / elements**4 + 5e-9)
+
+
+def test_a_membrane_deflated_away_from_a_plate_does_not_feel_it():
+    bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(16)), volume=-1.0)
+    assert fm.equilibrium(plate(elements=16), volume=-1.0).pressure == pytest.approx(bare.pressure, rel=1e-9)
+
+
+def test_no_pole_is_inside_a_body():
+    with pytest.raises(fm.SolveError, match="inside a body"):
+        fm.equilibrium(plate(elements=8), center_height=0.6)
+
+
+def test_between_two_plates():
+    """A sphere between two plates is flattened on both sides alike, with opposite forces."""
+    plates = [fm.Plane(1.2), fm.Plane(-1.2, side="above")]
+    eq = fm.equilibrium(fm.Scene(material=NH, mesh=fm.sphere(32), obstacles=plates), volume=11.0)
+    top, bottom = (next(z for z in eq.contact.zones if z.body == k) for k in (0, 1))
+    assert top.force == pytest.approx(-bottom.force, rel=1e-9)
+    assert top.force == pytest.approx(np.pi * max(top.radii) ** 2 * eq.pressure, rel=1e-6)
+
+
+def test_correct_takes_a_guess_on_a_mesh_that_follows_a_border():
+    eq = fm.equilibrium(plate(elements=16), volume=1.1)
+    result = correct(eq.potential, VolumeControl(1.1), eq.state, eq.pressure)
+    assert result.pressure == pytest.approx(eq.pressure, rel=1e-12)
+
+
+def test_a_verdict_at_the_touch_says_both_bounds():
+    """Held by no force: between the eigenvalues with the pole free and with the pole held."""
+    branch = fm.trace(plate(elements=16), start=0.6, until={"volume": 1.0})
+    touch = next(p for p in branch.special_points if p.kind == "touch").equilibrium
+    bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(16)), volume=touch.volume)
+    verdict = touch.verdict("pressure")
+    assert verdict.stable
+    assert verdict.smallest_eigenvalue == pytest.approx(bare.verdict("pressure").smallest_eigenvalue, rel=1e-6)
+    if touch.contact.touching:
+        assert "between" in verdict.reason
+    assert "between" not in branch[-1].verdict("pressure").reason

@@ -110,7 +110,7 @@ def record(
 
 
 def record_on_borders(
-    scene: Scene, state: State, solve: Solve, previous: Equilibrium | None, clock: float, gas: Gas | None = None
+    scene: Scene, state: State, solve: Solve, previous: Equilibrium | None = None, clock: float | None = None, gas: Gas | None = None
 ) -> Equilibrium:
     """The record of a state, put on elements that end at the borders of its zones where the scene wants that.
 

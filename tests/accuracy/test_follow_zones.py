@@ -129,3 +129,10 @@ def test_an_accuracy_is_kept_with_high_degrees():
     assert eq.scene.degree > 4
     assert eq.scene.mesh.elements < 24
     assert eq.scene.mesh.accuracy == 1e-9
+
+
+def test_a_search_follows_zones_too():
+    found = fm.equilibria(following(8, 3), volume=DISC[-0.1].volume, max_steps=120)
+    eq = next(eq for eq in found if abs(eq.center_height + 0.1) < 1e-3)
+    assert eq.pressure == pytest.approx(DISC[-0.1].pressure, rel=5e-7)
+    assert set(eq.zones("mechanical").borders) <= set(eq.scene.mesh.radii)

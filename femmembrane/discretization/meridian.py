@@ -441,7 +441,7 @@ def check_accuracy(mesh: Any, places: str, *, given: bool) -> None:
         key = places if mesh.estimated is None else "estimated"
         raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
     if mesh.open and given:
-        key = next(key for key in ("elements", "divisions", "ratio") if getattr(mesh, key, None) not in (None, 1))
+        key = next(key for key in ("divisions", "elements", "ratio") if getattr(mesh, key, None) not in (None, 1))
         raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
     if mesh.estimated is not None:
         object.__setattr__(mesh, "estimated", float(mesh.estimated))

@@ -36,6 +36,8 @@ Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
 _OF_POTENTIAL = ("verdict", "errors", "tangent", "contact")
+#: kinds of answers that hold on to the potential
+_WITH_POTENTIAL = ("contact",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,10 @@ class Equilibrium:
     electric_energy: float = field(default=0.0, repr=False)
     on_branch: Equilibrium | None = field(default=None, repr=False)
     _answers: dict[Key, Any] = field(default_factory=dict, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy has: answers that belong to a potential are found anew, as another process builds its own."""
+        return {**vars(self), "_answers": {key: answer for key, answer in self._answers.items() if key[0] not in _WITH_POTENTIAL}}
 
     @property
     def energy(self) -> float:

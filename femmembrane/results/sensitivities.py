@@ -207,6 +207,8 @@ def sensitivity_along(branch: Branch, of: Any, to: Any, held: str | None, along:
         inside = sensitivity_of_point(_first_limit(branch, of), [OF_LIMIT[name] for name in quantities], to, along)
         named = {name: inside[OF_LIMIT[name]] for name in quantities}
         return named[of] if isinstance(of, str) else named
+    if held is None and branch.hold:
+        held = next(iter(branch.hold))
     found = [sensitivity_of(eq, of, to, held, along) for eq in branch]
     return _stacked(found)
 

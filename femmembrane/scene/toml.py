@@ -40,7 +40,7 @@ from ..checks import choice, number, sequence
 from ..discretization.curve import Curve
 from ..discretization.meridian import Disc, Meridian
 from ..discretization.mesh_files import read_meridian
-from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
+from ..discretization.shapes import Annulus, Cap, Sphere, Torus, Tube
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
 from ..physics.chamber import Chamber
@@ -53,7 +53,7 @@ from ..physics.magnetics import Dipole
 from ..physics.magnets import Magnet
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
 from ..physics.named import material
-from ..physics.obstacles import Ball, CylinderObstacle, Mould, Plane
+from ..physics.obstacles import Ball, Cylinder, Mould, Plane
 from ..physics.scales import Scales
 from ..physics.sources import Loop, Solenoid, Uniform, Wire
 from ..physics.tabulated import Tabulated
@@ -89,13 +89,13 @@ SOURCES: dict[str, Any] = {
     "wire": Wire,
 }
 LOADS: dict[str, Any] = {"hub-force": HubForce, "hydrostatic": Hydrostatic, "weight": Weight}
-OBSTACLES: dict[str, Any] = {"ball": Ball, "cylinder": CylinderObstacle, "mould": Mould, "plane": Plane}
+OBSTACLES: dict[str, Any] = {"ball": Ball, "cylinder": Cylinder, "mould": Mould, "plane": Plane}
 SHAPES: dict[str, Any] = {
     "disc": Disc,
     "annulus": Annulus,
     "cap": Cap,
     "sphere": Sphere,
-    "cylinder": Cylinder,
+    "cylinder": Tube,
     "torus": Torus,
     "curve": Curve,
 }

@@ -364,7 +364,18 @@ def on_borders(mesh: Any, places: Array, fixed: Sequence[float] = ()) -> Any:
     """
     ends = mesh.breakpoints()
     moved = through(ends, places, fixed)
-    return mesh if moved is ends else mesh.on_ends(moved)
+    return mesh if moved is ends else on_own_ends(mesh, moved)
+
+
+def on_own_ends(mesh: Any, ends: Array) -> Any:
+    """A mesh with other ends, chosen for the accuracy that it was chosen for itself.
+
+    Parameters
+    ----------
+    mesh : Meridian
+    ends : ndarray
+    """
+    return mesh.on_ends(ends, getattr(mesh, "accuracy", None), getattr(mesh, "estimated", None))
 
 
 def through(ends: Array, places: Array, fixed: Sequence[float] = ()) -> Array:

@@ -106,7 +106,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
         *("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
-    "mesh": ("degree",),
+    "mesh": ("degree", "follow_zones"),
     "effects": ("tension_field", "demagnetization", "bending"),
 }
 #: arguments of Electric whose keys are words that Python keeps for itself, or stand beside one
@@ -216,7 +216,11 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         "source": [_describe("source", "kind", SOURCES, source) for source in scene.sources],
         "load": [_describe("load", "kind", LOADS, load) for load in scene.loads],
         "obstacle": [_describe("obstacle", "kind", OBSTACLES, body) for body in scene.obstacles],
-        "mesh": {**_describe("mesh", "shape", SHAPES, scene.mesh), **{name: getattr(scene, name) for name in SCENE_KEYS["mesh"]}},
+        "mesh": {
+            **_describe("mesh", "shape", SHAPES, scene.mesh),
+            "degree": scene.degree,
+            **({"follow_zones": True} if scene.follow_zones else {}),
+        },
         "run": _arguments(scene.run) if scene.run else {},
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
         "scales": _arguments(scene.scales) if scene.scales else {},

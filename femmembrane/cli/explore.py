@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .folders import Changes, System, finished, read, units_of
-from .outcome import DONE, say
+from .outcome import DONE, say, written_in_words
 
 
 def explore(
@@ -45,7 +45,7 @@ def explore(
     if changes:
         raise InputError("--set", changes[0], "allowed with --live only: a finished run has its scene")
     page = write(source, out, units or "scaled")
-    say(f"written:\n  {page}\n")
+    say(written_in_words("", [page]))
     return DONE
 
 

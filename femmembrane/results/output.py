@@ -134,7 +134,7 @@ def refuse_other_branch(branch: Branch, facts: Mapping[str, Any], folder: Path) 
     InputError
         Naming all that differs in the scene; where the scene is the same, that it is another run of it.
     """
-    differing = scene_difference(branch.scene.to_dict(), facts["scene"])
+    differing = scene_difference(branch.scene.record(), facts["scene"])
     # wall times are those of one run alone
     own = {"status": branch.status.value, "message": branch.message, "equilibria": len(branch), "timings": dict(branch.timings)}
     if not differing and all(facts.get(name, value) == value for name, value in own.items()):
@@ -221,7 +221,7 @@ def _writable(folder: Path) -> Path:
 def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any]:
     """The record of a run: what was asked, on which machine, and how it ended."""
     return {
-        "scene": branch.scene.to_dict(),
+        "scene": branch.scene.record(),
         "command": command if command is None or isinstance(command, str) else list(command),
         **({"mesh": branch.mesh_used} if branch.mesh_used else {}),
         **({"notes": list(branch.notes)} if branch.notes else {}),

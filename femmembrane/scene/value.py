@@ -31,6 +31,7 @@ from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
 from .bodies import check_obstacles
 from .magnetisation import checked_magnetisation, refuse_magnetisation
+from .own import parts_from
 from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 from .variation import names
@@ -412,8 +413,12 @@ class Scene:
         """
         return tables_of(self)
 
+    def record(self) -> dict[str, Any]:
+        """The tables of :meth:`to_dict` for the record of a run; a part without a form in scene files has its class and a note there."""
+        return tables_of(self, record=True)
+
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], folder: str | PathLike[str] = ".") -> Self:
+    def from_dict(cls, data: Mapping[str, Any], folder: str | PathLike[str] = ".", own: bool | Scene = False) -> Self:
         """The scene that the tables of a scene file describe.
 
         Parameters
@@ -422,6 +427,9 @@ class Scene:
             Tables, as :meth:`to_dict` gives them.
         folder : path
             Where the path of a mesh file starts from.
+        own : bool or Scene
+            Where parts named ``module:Class`` come from: modules that are imported (True, for tables that you trust as you trust a
+            program), nowhere (False: they are refused), or a scene that has them.
 
         Raises
         ------
@@ -432,11 +440,11 @@ class Scene:
         from .laboratory import scaled
 
         with shown_as_given(data):
-            return cls(**scene_arguments(scaled(data), Path(folder)))
+            return cls(**scene_arguments(scaled(data), Path(folder), parts_from(own, Path(folder))))
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> Self:
-        """Read a scene file.
+        """Read a scene file. A part named ``module:Class`` in it is imported, from the folder of the file or the path of Python.
 
         Parameters
         ----------
@@ -447,7 +455,7 @@ class Scene:
         InputError
             When the file cannot be read, is no TOML (with the line), or does not describe a scene.
         """
-        return cls.from_dict(read_tables(path), Path(path).parent)
+        return cls.from_dict(read_tables(path), Path(path).parent, own=True)
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a scene file that :meth:`from_toml` reads back to an equal scene.

@@ -7,6 +7,7 @@ on its own, so that its row does not depend on the process or the time.
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -35,6 +36,15 @@ WORKER_BYTES = 100 * 2**20
 def cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def sendable(scene: Scene) -> bool:
+    """Whether other processes can get a scene: not with a function that no module holds."""
+    try:
+        pickle.dumps(scene)
+    except Exception:  # whatever an object of somebody's own raises
+        return False
+    return True
 
 
 def here(tasks: Iterator[Task]) -> Iterator[tuple[str, Row]]:

@@ -51,7 +51,8 @@ def write_run(
     ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), the files of the analyses that the scene
     asks for (of wrinkling ``zones.csv`` and ``zones.png``), ``pressure-volume.png`` (over a number
     ``response.png``), ``membrane.pvd`` with one VTU file an equilibrium in
-    ``membrane/`` and, last, ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without
+    ``membrane/`` (not with ``vtu=False`` in the scene)
+    and, last, ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without
     equilibria leaves ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write are
     removed, so that the folder speaks of one run only.
 
@@ -192,7 +193,8 @@ def _writers(branch: Branch, command: str | Sequence[str] | None, units: str) ->
     if len(branch):
         diagram = DIAGRAMS[bool(branch.over)]
         writers |= {"branch.nc": partial(save, branch), diagram: partial(door.plot_pressure_volume, branch, units=units)}
-        writers[SURFACES] = partial(door.write_vtk, branch)
+        if branch.scene.vtu:
+            writers[SURFACES] = partial(door.write_vtk, branch)
         writers |= {name: partial(draw, branch) for analysis in analyses for name, draw in analysis.pictures.items()}
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
     return writers

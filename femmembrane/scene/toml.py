@@ -14,6 +14,7 @@ A scene file has one table for each part; the keys of a table are the arguments 
                 file, ...        or a mesh file and what else FILE_KEYS lists; the scene keeps its points
     [electric]                   Electric
     [effects]                    attributes of Scene that are on or off
+    [output]                     vtu: whether a run writes surfaces
     [run]                        Run
     [analysis]                   Analysis
     [scales]                     Scales
@@ -110,6 +111,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
     ),
     "mesh": ("degree",),
     "effects": ("tension_field", "demagnetization", "bending"),
+    "output": ("vtu",),
 }
 #: attributes of Scene that may be functions along the meridian
 _ALONG = ("thickness", "modulus", "remanence")
@@ -241,6 +243,8 @@ def tables_of(scene: Scene, record: bool = False) -> dict[str, Any]:
                 f"membrane.{name}", getattr(scene, name).given, "a function has no name in scene files; an expression or a table has"
             )
     tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
+    if scene.vtu:  # as in files that are older than the key
+        del tables["output"]
     if scene.prestretch == 1:
         del tables["membrane"]["prestretch"]
     if scene.scales:  # which hold it already

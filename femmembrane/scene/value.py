@@ -109,6 +109,8 @@ class Scene:
         scales, and elements of degree 2 or higher.
     obstacles : sequence of Obstacle
         Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
+    vtu : bool
+        Whether a run writes surfaces for ParaView to its folder, most of what is in it. They change no number.
     borders : tuple of (int, float)
         Found with an equilibrium in contact, and not to be given: ends of elements that stand at the borders of contact, by their numbers,
         with their places along the meridian.
@@ -158,6 +160,7 @@ class Scene:
     #: whether R0/T was given, by itself or by scales
     _thickness_given: ClassVar[bool] = False
     obstacles: tuple[Obstacle, ...] = ()
+    vtu: bool = field(default=True, repr=False)
     borders: tuple[tuple[int, float], ...] = field(default=(), repr=False, metadata={"found": True})
 
     def __post_init__(self) -> None:
@@ -192,6 +195,7 @@ class Scene:
         store(
             self,
             bending=bending,
+            vtu=switch("output.vtu", self.vtu),
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
             loads=loads,

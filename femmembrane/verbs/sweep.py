@@ -246,10 +246,10 @@ def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
 
 
 def _key(scene: Scene, quantity: str, options: Options) -> str:
-    """The hash of everything that a row depends on. The title plays no part."""
+    """The hash of everything that a row depends on. Neither the title nor the files of a run play a part."""
     from .. import __version__
 
-    tables = {name: table for name, table in scene.record().items() if name != "title"}
+    tables = {name: table for name, table in scene.record().items() if name not in ("title", "output")}
     # earlier versions kept rows of membranes with their inside above with other signs
     signs = ["inside above"] if side(scene.mesh) < 0 else []
     text = json.dumps(

@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.process import BaseProcess
+from typing import Any
 
 import numpy as np
 
@@ -117,9 +118,25 @@ def _processes(workers: int) -> Iterator[Executor]:
     executor.shutdown()
 
 
+def _submit(executor: Executor, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    """Hand a task to an executor, which may start a process for it. Ctrl-C waits meanwhile: the process is born with it blocked, so that it
+    does not complain about an interrupt before :func:`_begin`.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        return executor.submit(function, *arguments)
+    resource_tracker.ensure_running()  # to start it later would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return executor.submit(function, *arguments)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin() -> None:
     """Set up a new process: Ctrl-C ends it without a word, and it ends with its parent, even if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     parent = parent_process()
     if parent is not None:
         threading.Thread(target=_follow, args=(parent,), daemon=True).start()
@@ -133,7 +150,7 @@ def _follow(parent: BaseProcess) -> None:
 def _try_out(executor: Executor, workers: int) -> None:
     """Make one trivial call, so that processes that cannot start are not taken for a fault of the scenes."""
     try:
-        executor.submit(os.getpid).result(_PATIENCE)
+        _submit(executor, os.getpid).result(_PATIENCE)
     except BrokenProcessPool:
         advice = 'a script must call this below if __name__ == "__main__":, for each process reads it; or give workers=1'
         raise InputError("workers", workers, f"no process could be started; {advice}") from None
@@ -158,7 +175,7 @@ def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task]
     for task in tasks:
         key, scene, quantity, options = task
         under_way[key] = task
-        futures[executor.submit(compute, scene, quantity, options)] = key
+        futures[_submit(executor, compute, scene, quantity, options)] = key
         if len(futures) >= room():
             yield from _finished(futures, under_way)
     while futures:
@@ -185,7 +202,7 @@ def _one_by_one(left: list[Task]) -> Iterator[tuple[str, Row]]:
             with _processes(1) as executor:
                 while left:
                     key, scene, quantity, options = left[0]
-                    row = executor.submit(compute, scene, quantity, options).result()
+                    row = _submit(executor, compute, scene, quantity, options).result()
                     left.pop(0)
                     yield key, row
         except BrokenProcessPool:

@@ -85,7 +85,7 @@ def run(
         fail(DONE, remark)
 
     with working(out, (*run_files(), NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
-        kept = unfinished(out) if resume else None
+        kept = unfinished(out, asked) if resume else None
         if kept is not None:
             same_scene(asked, kept, "--resume")
         elif resume and (ended := _ended(asked, out)) is not None:
@@ -103,9 +103,9 @@ def run(
                 checkpoints.save()
             written = _write(branch, out, scene, changes or (), system)
             if report:
-                written.append(write_report(out, units=system))
+                written.append(write_report(out, units=system, own=asked))
             if explore and len(branch):
-                written.append(write_explorer(out, units=system))
+                written.append(write_explorer(out, units=system, own=asked))
         except KeyboardInterrupt:  # the second one
             checkpoints.save()
             return fail(INTERRUPTED, f"interrupted while results were written to {out}: some are missing; --resume writes them")
@@ -134,7 +134,7 @@ def _ended(scene: Scene, out: Path) -> int | None:
     if facts["status"] == Status.INTERRUPTED:
         return None
     if facts["equilibria"]:
-        finished(out, facts)  # results that are damaged, or of another run, are refused here, and not reported as done
+        finished(out, facts, scene)  # results that are damaged, or of another run, are refused here, and not reported as done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)

@@ -77,6 +77,6 @@ def setup(app: Sphinx) -> None:
             field.label = "Attributes"  # the word of the docstrings
     made_by = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(HERE.glob("*.py")))).hexdigest()
     app.add_config_value("made_by", made_by, "env")  # other code here: every page is made anew
-    app.connect("config-inited", lambda app, config: repository_pages.generate(HERE, RUN), priority=1)
+    app.connect("config-inited", repository_pages.generate, priority=1)
     app.connect("source-read", repository_pages.include)
     app.connect("autodoc-process-docstring", repository_pages.escape, priority=1)

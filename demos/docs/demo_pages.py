@@ -50,7 +50,7 @@ def stored_picture(script: Path) -> Path | None:
     return next((path for name in names if (path := DEMOS / "pictures" / f"{name}.png").exists()), None)
 
 
-def stage(here: Path, names: Collection[str] | None) -> None:
+def stage(here: Path, running: str) -> None:
     """Copies of all scripts for sphinx-gallery; of those that are not run, with their stored pictures."""
     for folder in FOLDERS:
         copies = here / "generated" / "scripts" / folder
@@ -62,7 +62,7 @@ def stage(here: Path, names: Collection[str] | None) -> None:
             if beside.suffix in (".toml", ".csv"):
                 shutil.copyfile(beside, copies / beside.name)
         for script in scripts(folder):
-            run = names is None or script.name in names
+            run = re.search(running, str(copies / script.name)) is not None
             pages = here / "generated" / folder
             (copies / script.name).write_text(staged(script, pages, run), encoding="utf-8")
 

@@ -175,7 +175,7 @@ BODIES = [
     (
         {"kind": "cylinder", "height": 0.03, "radius": 0.004, "length": 0.01, "rounding": 0.001},
         {"kind": "cylinder", "height": "30 mm", "radius": "4 mm", "length": "10 mm", "rounding": "1 mm"},
-        fm.CylinderObstacle(1.5, 0.2, 0.5, rounding=0.05),
+        fm.Cylinder(1.5, 0.2, 0.5, rounding=0.05),
     ),
     (
         {"kind": "mould", "points": [[0, 0.012], [0.02, 0.01]], "rounding": 0.001},

@@ -9,6 +9,7 @@ quantity               unit                  SI
 ``stress``             mu                    Pa
 ``energy``             mu T R0^2             J
 ``force``              mu T R0               N
+``area``               R0^2                  m^2
 ``field``              sqrt(mu/mu0)          A/m
 ``weight``             mu/(g R0)             kg/m^3
 ``gamma``              mu T/(g R0^2)         kg/m^3
@@ -234,6 +235,7 @@ class Scales:
             field = math.sqrt(mu / mu_0)
             unit = {
                 "force": mu * T * R,
+                "area": R * R,
                 "field": field,
                 "weight": mu / g / R,
                 "gamma": mu * T / R / g / R,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import choice
 from ..discretization.meridian import LEAST_LENGTH
 from ..errors import InputError, Status
+from ..quantities import si_values
 from ..scene import ALL, WRINKLING
 from ..scene.variation import Parameter
 from ..solve.controls import check_height, control_kind
@@ -242,7 +243,8 @@ class Equilibrium:
         s = self.places(r)
         columns = door.profile_at(self.scene, self.state, self.pressure, s).columns(self.scene.converter)
         if (contact := self.contact) is not None:
-            columns |= {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
+            of_contact = {"gap": contact.gap(s), "contact_pressure": contact.pressure(s)}
+            columns |= of_contact if self.scene.scales is None else of_contact | si_values(of_contact, self.scene.scales)
         return columns
 
     def places(self, r: ArrayLike | None = None) -> Array:

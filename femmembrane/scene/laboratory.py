@@ -39,6 +39,7 @@ _KINDS: Mapping[str, Mapping[str, str]] = {
         "h_z": "field",
     },
     "load": {"weight": "weight", "gamma": "gamma", "force": "force"},
+    "obstacle": {"height": "length", "radius": "length", "length": "length", "rounding": "length", "points": "length"},
     "chamber": {"volume": "volume", "atmosphere": "pressure"},
     "electric": {"voltage": "V", "total_charge": "C", "frozen_charge": "C/m^2", "breakdown": "V/m", "from": "length", "to": "length"},
     "mesh": {
@@ -113,8 +114,10 @@ def _measured_scales(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _names_unit(tables: Mapping[str, Any]) -> bool:
-    mesh = tables.get("mesh")
-    return isinstance(mesh, Mapping) and isinstance(mesh.get("unit"), str)
+    """Whether a mesh file or the file of a mould has a unit by its name."""
+    obstacles = tables.get("obstacle")
+    found = [tables.get("mesh"), *(obstacles if isinstance(obstacles, (list, tuple)) else ())]
+    return any(isinstance(table, Mapping) and isinstance(table.get("unit"), str) for table in found)
 
 
 def _has_units(value: Any) -> bool:
@@ -188,10 +191,12 @@ class _Laboratory:
         return {name: self._number(f"{path}.{name}", value, kinds.get(name, "")) for name, value in table.items()}
 
     def _item(self, name: str, path: str, table: Any, strength: str = "") -> Any:
-        """A source or load. The key of its strength in errors may be another one."""
+        """A source, load or obstacle. The key of its strength in errors may be another one."""
         if not isinstance(table, Mapping):
             return table
         changed = self._table(path, table, _KINDS[name])
+        if name == "obstacle":
+            changed |= self._unit_of_file(path, table)
         if name == "source" and "strength" in table:
             changed["strength"] = self._strength(strength or f"{path}.strength", changed)
         return changed
@@ -225,11 +230,14 @@ class _Laboratory:
         for name in ENDS:
             if isinstance(table.get(name), Mapping):
                 changed[name] = self._table(f"mesh.{name}", table[name], _KINDS["mesh"])
-        if "file" in table and (self.si or isinstance(table.get("unit"), str)):
-            unit = table.get("unit", "m")
-            length = f"1 {unit}" if isinstance(unit, str) else unit
-            changed["unit"] = self._number("mesh.unit", length, "length")
-        return changed
+        return changed | self._unit_of_file("mesh", table)
+
+    def _unit_of_file(self, path: str, table: Mapping[str, Any]) -> dict[str, Any]:
+        """The unit of the lengths in a file, where the table names a file."""
+        if "file" not in table or not (self.si or isinstance(table.get("unit"), str)):
+            return {}
+        unit = table.get("unit", "m")
+        return {"unit": self._number(f"{path}.unit", f"1 {unit}" if isinstance(unit, str) else unit, "length")}
 
     def _run(self, table: Mapping[str, Any]) -> dict[str, Any]:
         changed = dict(table)

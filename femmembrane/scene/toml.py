@@ -269,7 +269,7 @@ def _known_keys() -> dict[str, set[str]]:
     keys["material"] = {"model", "name"} | arguments(*MATERIALS.values())
     keys["source"] = {"kind", "remanence"} | arguments(*SOURCES.values())
     keys["load"] = {"kind"} | arguments(*LOADS.values())
-    keys["obstacle"] = {"kind", "file"} | arguments(*OBSTACLES.values())
+    keys["obstacle"] = {"kind", "file", "unit"} | arguments(*OBSTACLES.values())
     keys["mesh"] |= {"shape", "file", "unit", *FILE_KEYS} | arguments(*SHAPES.values())
     keys["electric"] = {ELECTRIC_KEYS.get(name, name) for name in arguments(Electric)}
     return keys | {"run": arguments(Run), "analysis": arguments(Analysis), "scales": arguments(Scales), "chamber": arguments(Chamber)}
@@ -340,10 +340,14 @@ def _build_mesh(table: Mapping[str, Any], folder: Path, own: Parts) -> Meridian:
     if not isinstance(table["file"], str):
         raise InputError("mesh.file", table["file"], "the path of a mesh file is allowed, from the folder of the scene")
     curve = read_meridian(folder / table["file"], **{name: table[name] for name in FILE_KEYS if name in table})
-    unit = number(
-        "mesh.unit", table.get("unit", 1), 'a unit of length such as "mm", or the length of the unit over R0, is allowed', above=0
-    )
+    unit = _unit_of_file("mesh", table)
     return curve if unit == 1 else dataclasses.replace(curve, points=tuple((unit * r, unit * z) for r, z in curve.points))
+
+
+def _unit_of_file(path: str, table: Mapping[str, Any]) -> float:
+    """The unit of the lengths in a file, over R0."""
+    allowed = 'a unit of length such as "mm", or the length of the unit over R0, is allowed'
+    return number(f"{path}.unit", table.get("unit", 1), allowed, above=0)
 
 
 def _build_list(name: str, registry: Mapping[str, Any], tables: Any, own: Parts, scales: Scales | None = None) -> tuple[Any, ...]:
@@ -373,13 +377,15 @@ def _with_points(tables: Any, folder: Path) -> Any:
     found = []
     for k, table in enumerate(tables):
         if isinstance(table, Mapping) and table.get("kind") == "mould" and "file" in table:
-            key = f"{item_path('obstacle', k, len(tables))}.file"
+            path = item_path("obstacle", k, len(tables))
+            key = f"{path}.file"
             if not isinstance(table["file"], str):
                 raise InputError(key, table["file"], "the path of a text file is allowed, from the folder of the scene")
             if "points" in table:
                 raise InputError(key, table["file"], "not allowed beside points; leave one out")
-            rest = {name: value for name, value in table.items() if name != "file"}
-            table = rest | {"points": Mould.from_file(folder / table["file"]).points}
+            unit = _unit_of_file(path, table)
+            rest = {name: value for name, value in table.items() if name not in ("file", "unit")}
+            table = rest | {"points": [[unit * rho, unit * z] for rho, z in Mould.from_file(folder / table["file"]).points]}
         found.append(table)
     return found
 

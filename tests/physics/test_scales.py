@@ -42,6 +42,8 @@ LINEAR = sorted(SI_UNITS.keys() - set(SQUARED))
         ("pressure", 400.0, "Pa"),
         ("stress", 4e5, "Pa"),
         ("energy", 0.05, "J"),
+        ("force", 1.0, "N"),
+        ("area", 2.5e-3, "m^2"),
         ("remanence", math.sqrt(mu_0 * 4e5), "T"),
         ("magnetization", math.sqrt(4e5 / mu_0), "A/m"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.constants import mu_0
 
 import femmembrane as fm
 from femmembrane.errors import InputError
-from femmembrane.scene.laboratory import scaled
+from femmembrane.scene.laboratory import _KINDS, number_kind, scaled
+from femmembrane.scene.toml import ELECTRIC_KEYS, LOADS, OBSTACLES, SOURCES
 
 #: R0 = 20 mm, T = 0.3 mm, mu = 0.4 MPa: mu T/R0 = 6000 Pa, R0^3 = 8 ml
 SCALES = {"radius": 0.02, "thickness": 3e-4, "shear_modulus": 4e5}
@@ -165,6 +167,58 @@ def test_tables_of_other_physics_by_hand():
     assert tables["membrane"] == {"remanence": pytest.approx(magnetization), "saturation": pytest.approx(magnetization)}
     assert tables["source"][0] == {"kind": "magnet", "remanence": 1.3, "height": 2.5, "inner_radius": 0.1}
     assert tables["run"] == {"control": "gas", "start": pytest.approx(0.5), "hold": {"pressure": pytest.approx(0.5)}}
+
+
+BODIES = [
+    ({"kind": "plane", "height": 0.012}, {"kind": "plane", "height": "12 mm"}, fm.Plane(0.6)),
+    ({"kind": "ball", "height": 0.03, "radius": 0.01}, {"kind": "ball", "height": "3 cm", "radius": "10 mm"}, fm.Ball(1.5, 0.5)),
+    (
+        {"kind": "cylinder", "height": 0.03, "radius": 0.004, "length": 0.01, "rounding": 0.001},
+        {"kind": "cylinder", "height": "30 mm", "radius": "4 mm", "length": "10 mm", "rounding": "1 mm"},
+        fm.Cylinder(1.5, 0.2, 0.5, rounding=0.05),
+    ),
+    (
+        {"kind": "mould", "points": [[0, 0.012], [0.02, 0.01]], "rounding": 0.001},
+        {"kind": "mould", "points": [[0, "12 mm"], ["2 cm", "10 mm"]], "rounding": "1 mm"},
+        fm.Mould(((0, 0.6), (1, 0.5)), rounding=0.05, side="right"),
+    ),
+]
+
+
+@pytest.mark.parametrize(("si", "text", "expected"), BODIES, ids=[body[0]["kind"] for body in BODIES])
+def test_obstacles_by_hand(si, text, expected):
+    """Lengths over R0 = 20 mm, in SI numbers and with their units."""
+    for found in (scene(obstacle=[si]), scene(obstacle=[text]), scene(units="scaled", obstacle=[text])):
+        (body,) = found.obstacles
+        for field in dataclasses.fields(expected):
+            one, other = getattr(body, field.name), getattr(expected, field.name)
+            assert one == other if isinstance(other, str) else np.allclose(one, other, rtol=1e-14, atol=0), field.name
+
+
+def test_the_file_of_a_mould_has_a_unit(tmp_path):
+    (tmp_path / "mould.txt").write_text("0 12\n20 10\n", encoding="utf-8")
+    body = {"kind": "mould", "file": str(tmp_path / "mould.txt")}
+    for tables in ({}, {"units": "scaled"}):
+        (mould,) = scene(**tables, obstacle=[{**body, "unit": "mm"}]).obstacles
+        assert np.allclose(mould.points, [[0, 0.6], [1, 0.5]], rtol=1e-14)
+    (mould,) = scene(obstacle=[body]).obstacles  # numbers of the file are metres
+    assert np.allclose(mould.points, [[0, 600], [1000, 500]], rtol=1e-14)
+    (mould,) = scene(units="scaled", obstacle=[body]).obstacles
+    assert mould.points == ((0, 12), (20, 10))
+    with pytest.raises(InputError, match=r"obstacle.unit.*a length"):
+        scene(obstacle=[{**body, "unit": "kPa"}])
+
+
+def test_every_number_of_a_scene_file_has_a_kind_or_is_a_ratio():
+    """A number with a unit would stay a text where nobody says what it is."""
+    ratios = {"orientation", "loops", "tolerance", "strength", "body", "kind", "hub", "side"}  # a strength is told by its source
+    classes = {"source": SOURCES, "load": LOADS, "obstacle": OBSTACLES}
+    for table, registry in classes.items():
+        names = {f.name for cls in registry.values() for f in dataclasses.fields(cls) if f.init}
+        assert names - ratios == {name for name in names if number_kind(f"{table}.0.{name}")}, table
+    for table, cls in (("chamber", fm.Chamber), ("electric", fm.Electric)):
+        for field in dataclasses.fields(cls):
+            assert field.name in ("relative_permittivity",) or ELECTRIC_KEYS.get(field.name, field.name) in _KINDS[table], field.name
 
 
 @pytest.mark.parametrize(
@@ -381,6 +435,7 @@ def test_units_that_are_refused(units):
         ({"run": {"control": "pressure", "values": ["5 kPas"]}}, "run.values[0]", "'kPas' is no unit known here"),
         ({"run": {"control": "arc-length", "start": 1e-6, "until": {"pressure": "5 mm"}}}, "run.until.pressure", "a pressure"),
         ({"mesh": {"shape": "cap", "height": "5 kPa"}}, "mesh.height", "a length"),
+        ({"obstacle": [{"kind": "plane", "height": "5 kPa"}]}, "obstacle.height", "a length"),
         ({"source": [{"kind": "dipole", "strength": "5 T", "height": 1}]}, "source.strength", "a magnetic moment"),
         ({"source": [{"kind": "dipole", "strength": -0.5, "height": 1}]}, "source.strength", ">= 0"),
         ({"load": [{"kind": "weight", "weight": "5 N"}, {"kind": "weight", "weight": 1}]}, "load[0].weight", "a density"),
@@ -419,6 +474,7 @@ def test_numbers_that_are_refused(tables, key, text):
             "source[1].height = '0 mm'",
         ),
         ({"source": [{"kind": "wire", "strength": "-3 A"}]}, "source.strength = '-3 A'"),
+        ({"obstacle": [{"kind": "ball", "height": "1 cm", "radius": "-4 mm"}]}, "obstacle.radius = '-4 mm'"),
         ({"load": [{"kind": "hub-force", "force": "3e90 N"}]}, "load.force = '3e90 N'"),
         ({"run": {"control": "pressure", "values": ["1 kPa", "3e90 kPa"]}}, "run.values[1] = '3e90 kPa'"),
         ({"membrane": {"thickness": "-0.1 mm"}}, "membrane.thickness = '-0.1 mm'"),

@@ -11,6 +11,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.potential import potential_of
 from femmembrane.potential.potential import Potential
+from femmembrane.results.analyses.contact import ContactWithBodies
 from femmembrane.solve import active_set
 from femmembrane.solve.controls import PressureControl, VolumeControl
 from femmembrane.solve.minimize import minimize
@@ -362,3 +363,24 @@ def test_a_verdict_at_the_touch_says_both_bounds():
     if touch.contact.touching:
         assert "between" in verdict.reason
     assert "between" not in branch[-1].verdict("pressure").reason
+
+
+def test_contact_is_told_in_si_units_of_a_scene_with_scales():
+    """R0 = 20 mm, T = 0.3 mm, mu = 0.4 MPa: a force has the unit mu T R0 = 2.4 N, an area 4 cm^2, a pressure 6 kPa.
+
+    On the plate the flat part carries the pressure alone: the force is p pi r^2.
+    """
+    scales = fm.Scales(radius=0.02, thickness=3e-4, shear_modulus=4e5)
+    branch = fm.inflate(plate(elements=16, scales=scales), volumes=[0.4, 1.2])
+    row = branch.to_dataframe().iloc[-1]
+    units = {"radius": ("m", 0.02), "reference_radius": ("m", 0.02), "force": ("n", 2.4), "area": ("m2", 4e-4)}
+    for name, (unit, size) in units.items():
+        assert row[f"contact_{name}_{unit}"] == pytest.approx(size * row[f"contact_{name}"], rel=1e-14)
+    assert row.contact_force_n == pytest.approx(row.pressure_pa * np.pi * row.contact_radius_m**2, rel=1e-6)
+    assert branch.column("least_gap_m")[0] == pytest.approx(0.02 * (0.5 - branch[0].center_height), rel=1e-9)
+    shape = branch[-1].profile([0.1])
+    assert shape["contact_pressure_pa"] == pytest.approx(6000 * shape["contact_pressure"], rel=1e-14)
+    assert shape["gap_m"] == pytest.approx(0.02 * shape["gap"])
+    assert not [name for name in fm.inflate(plate(elements=8), volumes=[0.4]).to_dataframe() if name.endswith(("_m", "_n", "_m2"))]
+    said = f"a force of {row.contact_force_n * 1e3:.4g} mN" if row.contact_force_n < 1 else f"a force of {row.contact_force_n:.4g} N"
+    assert any(said in remark.text for remark in ContactWithBodies().remarks(branch[-1]))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...quantities import in_si, quantity, readable, si_values
 from .base import Cell, Curves, EquilibriumAnalysis, Remark, Section, Table
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from ..equilibrium import Equilibrium
 
 _COLUMNS = ("contact_radius", "contact_reference_radius", "contact_force", "contact_area", "least_gap")
+#: the same in SI units, of a scene with scales
+_IN_SI = {in_si(name): name for name in _COLUMNS}
 
 
 class ContactWithBodies(EquilibriumAnalysis):
@@ -25,32 +28,42 @@ class ContactWithBodies(EquilibriumAnalysis):
         return bool(scene.bodies)
 
     def columns(self, scene: Scene) -> Sequence[str]:
-        return _COLUMNS
+        return _COLUMNS if scene.scales is None else (*_COLUMNS, *_IN_SI)
 
     def value(self, equilibrium: Equilibrium, column: str) -> Cell:
-        contact = equilibrium.contact
-        if contact is None:
+        contact, scales, name = equilibrium.contact, equilibrium.scene.scales, _IN_SI.get(column, column)
+        if contact is None or (name != column and scales is None):
             return float("nan")
-        return float(getattr(contact, column.removeprefix("contact_")))
+        found = float(getattr(contact, name.removeprefix("contact_")))
+        return found if name == column or scales is None else float(scales.to_si(quantity(name).si, found))
 
     def at_nodes(self, equilibrium: Equilibrium) -> Mapping[str, NDArray[Any]]:
-        contact = equilibrium.contact
-        return {} if contact is None else {"gap": contact.gap(), "contact_pressure": contact.pressure()}
+        contact, scales = equilibrium.contact, equilibrium.scene.scales
+        if contact is None:
+            return {}
+        found = {"gap": contact.gap(), "contact_pressure": contact.pressure()}
+        return found if scales is None else found | si_values(found, scales)
 
     def remarks(self, equilibrium: Equilibrium) -> Iterator[Remark]:
         contact = equilibrium.contact
         if contact is not None and contact.touching:
-            text = f"up to the radius {contact.radius:.6g}, with a force of {contact.force:.6g}"
-            yield Remark("contact", text, terminal=f"contact to {contact.radius:.4g}", caption=f"contact to {contact.radius:.4g}")
+            scales = equilibrium.scene.scales
+            radius, force, short = f"{contact.radius:.6g}", f"{contact.force:.6g}", f"{contact.radius:.4g}"
+            if scales is not None:
+                radius = short = readable("contact_radius", contact.radius, scales)
+                force = readable("contact_force", contact.force, scales)
+            yield Remark("contact", f"up to the radius {radius}, with a force of {force}", f"contact to {short}", f"contact to {short}")
 
     def section(self, branch: Branch) -> Section:
+        scales = branch.scene.scales
         found = [eq.contact.zones for eq in branch if eq.contact is not None]
         rows = []
         for k, body in enumerate(branch.scene.bodies):
             forces = [sum(zone.normal_force for zone in zones if zone.body == k) for zones in found if any(z.body == k for z in zones)]
-            rows.append([body.label(), len(forces), f"{max(forces, default=0.0):.6g}"])
+            largest = max(forces, default=0.0)
+            rows.append([body.label(), len(forces), f"{largest:.6g}" if scales is None else readable("contact_force", largest, scales)])
         names = {"deformed": "contact_radius", "reference": "contact_reference_radius"}
         curves = {label: np.nan_to_num(branch.column(name)) for label, name in names.items()}
-        figure = Curves("Radius of contact along the branch", "radius of contact", curves)
+        figure = Curves("Radius of contact along the branch", "radius of contact over R₀", curves)
         table = Table(["body", "equilibria in contact", "largest force"], rows, "Bodies in the way of the membrane")
         return Section("Contact", figure, table, list(self.remarks(branch[-1])))

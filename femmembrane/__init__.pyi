@@ -9,9 +9,9 @@ from .discretization.mesh_files import read_meridian as read_meridian
 from .discretization.mesh_files import write_meridian as write_meridian
 from .discretization.shapes import Annulus as Annulus
 from .discretization.shapes import Cap as Cap
-from .discretization.shapes import Cylinder as Cylinder
 from .discretization.shapes import Sphere as Sphere
 from .discretization.shapes import Torus as Torus
+from .discretization.shapes import Tube as Tube
 from .discretization.shapes import annulus as annulus
 from .discretization.shapes import cap as cap
 from .discretization.shapes import cylinder as cylinder
@@ -50,7 +50,7 @@ from .physics.named import MaterialData as MaterialData
 from .physics.named import material as material
 from .physics.named import material_data as material_data
 from .physics.obstacles import Ball as Ball
-from .physics.obstacles import CylinderObstacle as CylinderObstacle
+from .physics.obstacles import Cylinder as Cylinder
 from .physics.obstacles import Mould as Mould
 from .physics.obstacles import Obstacle as Obstacle
 from .physics.obstacles import Plane as Plane

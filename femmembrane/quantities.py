@@ -204,6 +204,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "iterations": Quantity("solver iterations, rejected attempts included", type=int),
     "seconds": Quantity("wall time spent on the equilibrium", "s"),
     "status": Quantity("how the solve ended", type=str),
+    "element_ends": Quantity("ends of the elements along the meridian over R0"),
     "state": Quantity("displacement coefficients over R0 on the free degrees of freedom"),
     "r": Quantity("reference radius of the node over R0", label="reference radius r/R₀", si="length"),
     "s": Quantity(

@@ -4,6 +4,7 @@ Every demo is run for its page. With ``-t quick`` only a few are; the others sho
 ``linkcheck`` in place of ``html`` also asks the addresses outside, for which it needs the network.
 """
 
+import hashlib
 import sys
 from pathlib import Path
 
@@ -74,6 +75,8 @@ def setup(app: Sphinx) -> None:
     for field in PyObject.doc_field_types:
         if field.name == "variable":
             field.label = "Attributes"  # the word of the docstrings
-    app.connect("config-inited", lambda app, config: repository_pages.generate(HERE, RUN), priority=1)
+    made_by = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(HERE.glob("*.py")))).hexdigest()
+    app.add_config_value("made_by", made_by, "env")  # other code here: every page is made anew
+    app.connect("config-inited", repository_pages.generate, priority=1)
     app.connect("source-read", repository_pages.include)
     app.connect("autodoc-process-docstring", repository_pages.escape, priority=1)

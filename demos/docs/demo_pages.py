@@ -50,7 +50,7 @@ def stored_picture(script: Path) -> Path | None:
     return next((path for name in names if (path := DEMOS / "pictures" / f"{name}.png").exists()), None)
 
 
-def stage(here: Path, names: Collection[str] | None) -> None:
+def stage(here: Path, running: str) -> None:
     """Copies of all scripts for sphinx-gallery; of those that are not run, with their stored pictures."""
     for folder in FOLDERS:
         copies = here / "generated" / "scripts" / folder
@@ -62,7 +62,7 @@ def stage(here: Path, names: Collection[str] | None) -> None:
             if beside.suffix in (".toml", ".csv"):
                 shutil.copyfile(beside, copies / beside.name)
         for script in scripts(folder):
-            run = names is None or script.name in names
+            run = re.search(running, str(copies / script.name)) is not None
             pages = here / "generated" / folder
             (copies / script.name).write_text(staged(script, pages, run), encoding="utf-8")
 
@@ -99,10 +99,11 @@ def folder_of(script: str) -> Path:
 
 
 def arguments(gallery_conf: dict[str, Any], script_vars: dict[str, Any]) -> list[str]:
-    """Every demo writes into a folder of its own. sphinx-gallery asks before it runs a script."""
+    """Every demo writes into a folder of its own. sphinx-gallery asks before it runs a script, which is to know its own name and words."""
+    script = Path(script_vars["src_file"])
+    docstring = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8")))
+    script_vars["example_globals"].update(__file__=str(script), __doc__=docstring)
     out = folder_of(script_vars["src_file"])
-    if Path(script_vars["src_file"]).stem in ("paper", "printed_equations"):
-        return []
     shutil.rmtree(out, ignore_errors=True)
     return ["--out", str(out)]
 

@@ -6,13 +6,14 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import demo_pages
 import drawings
 from demo_pages import DEMOS, ROOT
 from sphinx.application import Sphinx
+from sphinx.config import Config
 
 HERE = Path(__file__).parent
 NOTEBOOKS = DEMOS / "notebooks"
@@ -28,8 +29,9 @@ def write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def generate(here: Path, run: Collection[str] | None) -> None:
-    demo_pages.stage(here, run)
+def generate(app: Sphinx, config: Config) -> None:
+    here = Path(app.srcdir)
+    demo_pages.stage(here, config.sphinx_gallery_conf["filename_pattern"])
     drawings.draw(here / "generated" / "drawings")
     write(here / "generated" / "scenes.rst", scenes(here))
     write(here / "generated" / "notebooks.rst", notebooks(here))

@@ -24,11 +24,11 @@ from numpy.typing import ArrayLike
 from ..discretization.curve import Curve
 from ..discretization.meridian import Accuracy, Asked, Meridian, by_quantity, in_words
 from ..discretization.space import Space, space_of
-from ..errors import SolveError, Status
+from ..errors import InputError, SolveError, Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.branch import first_point
-from ..solve.controls import CONTROLS
+from ..solve.controls import CONTROLS, Control
 from ..solve.finer_space import met_across, moved, solved_in, transferred
 from ..solve.newton import NewtonResult
 from ..solve.state import State
@@ -36,6 +36,7 @@ from ..solve.state_resolution import largest_kink
 from ..solve.wellposed import ill_posed, stress_scale
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import axisymmetric_verdict
+from .borders import holding, put_on_borders
 from .error_estimate import finer_space, same_state
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ _TRIAL_MESHES, _TRIAL_DEGREE = (12, 24, 48), 6
 _BLIND = 1e-2
 #: degree of the elements whose misses grade the mesh
 _GRADING_DEGREE = 4
-#: highest degree where zones are wrinkled: higher degrees gain nothing with borders inside elements
+#: highest degree where zones are wrinkled and not followed: higher degrees gain nothing with borders inside elements
 _WRINKLED_DEGREE = 4
 #: fewer elements would do for some accuracies, but may let a run lose its branch
 _FEWEST, _MOST = 3, 2000
@@ -216,7 +217,7 @@ class _Choice:
         self.target = _SHARE * tightest
         self.hardest = np.argsort(trial.errors)[::-1]
         self.density = trial.density()
-        most = _WRINKLED_DEGREE if trial.wrinkled else MAX_DEGREE
+        most = _WRINKLED_DEGREE if trial.wrinkled and not scene.follow_zones else MAX_DEGREE
         self.degree = int(np.clip(round(1 - np.log10(tightest) / 2), 2, most))
 
     def candidate(self, elements: int, degree: int) -> Scene:
@@ -291,7 +292,7 @@ class _Trial:
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
         for eq, weight in zip(self.states, weights, strict=True):
-            density = np.maximum(_misses(space, eq.state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+            density = np.maximum(_misses(space, eq.of_branch.state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
             smooth = np.exp(np.interp(s, centres, np.log(density)))
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
@@ -306,14 +307,28 @@ class _Trial:
 
     def _moved(self, scene: Scene, eq: Equilibrium) -> float:
         # a run over a number of the scene has a scene for every state
-        potential = potential_of(eq.scene.replace(mesh=scene.mesh, degree=scene.degree))
+        here = eq.scene.replace(mesh=scene.mesh, degree=scene.degree)
+        potential = potential_of(here)
         for kind in (CONTROLS[name] for name in reversed(_can_hold(self.controls, potential))):
             held = kind.at(kind.value(eq.potential.space, eq.state, eq.pressure, eq.volume))
             result = solved_in(potential, held, eq.potential, eq.state, eq.pressure, damped=True)
             if result.status is Status.CONVERGED:
-                error = relative_error(potential, result.x, result.pressure, self.controls, self.yardstick)
+                state = _followed(potential, here, State.of(result), held)
+                if state is None:
+                    continue
+                error = relative_error(state.evaluation.potential, state.x, state.pressure, self.controls, self.yardstick)
                 return error if np.isfinite(error) else np.inf
         return np.inf
+
+
+def _followed(potential: Potential, scene: Scene, state: State, held: Control) -> State | None:
+    """The state with elements that follow its zones where the scene wants that; None where it is lost."""
+    if not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
+        return state
+    try:
+        return put_on_borders(scene, scene, state, holding(held)).state
+    except (InputError, SolveError):  # as on too few elements
+        return None
 
 
 @dataclass(frozen=True)
@@ -413,7 +428,7 @@ def _estimated(equilibria: Sequence[Equilibrium], controls: tuple[str, ...], ele
     known = np.isfinite(errors)
     states = [eq for eq, k in zip(equilibria, known, strict=True) if k]
     wrinkled = any(eq.scene.tension_field and (eq.potential.evaluate(eq.state, eq.pressure).stress <= 0).any() for eq in states)
-    return _Trial(equilibria[0].potential.space, states, controls, errors[known], elements, wrinkled, yardstick)
+    return _Trial(equilibria[0].of_branch.potential.space, states, controls, errors[known], elements, wrinkled, yardstick)
 
 
 def _yardstick(equilibria: Sequence[Equilibrium], asked: Accuracy) -> Yardstick:

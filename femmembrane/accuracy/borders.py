@@ -11,16 +11,17 @@ Where a border is, the strain across beyond natural width is zero. That strain f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..discretization.curve import Curve
 from ..discretization.meridian import on_borders as moved_mesh
 from ..discretization.space import space_of_scene
 from ..errors import InputError, SolveError, Status
-from ..potential import Array, potential_of
+from ..potential import Array, Potential, potential_of
 from ..results.equilibrium import Equilibrium, recorded
 from ..results.zones import KINDS
 from ..scene import Scene
@@ -33,7 +34,7 @@ from ..stability.end_strains import strains_at_ends
 from ..stability.profile import profile_at
 from ..stability.zones import find_zones
 
-#: what a border may still move, over the length of the meridian: it enters what the energy decides with its third power
+#: a move after which borders are at rest, over the length of the meridian: the next one would be smaller by some orders
 _ARRIVED = 1e-8
 #: most rounds of moving the ends, and most times that the zones themselves are looked for anew
 _ROUNDS, _FRESH = 8, 3
@@ -41,6 +42,15 @@ _ROUNDS, _FRESH = 8, 3
 _NARROW = 1e-5
 #: bits of the kinds of zones, of the strains along both directions
 _BITS = (2, 1)
+
+
+#: from a potential and a state in another space to the equilibrium that it stands for
+Solve = Callable[[Potential, State], NewtonResult]
+
+
+def holding(held: Control) -> Solve:
+    """What is solved for while a control holds its load."""
+    return lambda onto, state: solved_in(onto, held, state.evaluation.potential, state.x, state.pressure, damped=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +71,7 @@ class OnBorders:
     moves: tuple[float, ...]
 
 
-def put_on_borders(base: Scene, scene: Scene, state: State, held: Control) -> OnBorders:
+def put_on_borders(base: Scene, scene: Scene, state: State, solve: Solve) -> OnBorders:
     """The equilibrium that a state stands for, at the same load, on elements that end on the borders of its zones.
 
     Parameters
@@ -71,8 +81,8 @@ def put_on_borders(base: Scene, scene: Scene, state: State, held: Control) -> On
     scene : Scene
         The scene of the state; of another mesh, or the same.
     state : State
-    held : Controlled
-        What is the same: a control at its load.
+    solve : callable
+        Finds the equilibrium in another space from the state in one, with the same load: see :func:`holding`.
 
     Raises
     ------
@@ -89,12 +99,13 @@ def put_on_borders(base: Scene, scene: Scene, state: State, held: Control) -> On
         while True:
             wanted = moved_mesh_of(base, borders.places)
             if wanted is not scene:
-                scene, state = _solved(wanted, state, held)
+                scene, state = _solved(wanted, state, solve)
             if not len(borders.places):
                 break
             step = borders.next(scene, state)
             moves.append(step)
             if step <= _ARRIVED:
+                scene, state = _solved(moved_mesh_of(base, borders.places), state, solve)
                 break
             if borders.rounds >= _ROUNDS:
                 raise SolveError("the borders of its zones do not come to rest; more elements may help", status=Status.NOT_CONVERGED)
@@ -111,9 +122,8 @@ def moved_mesh_of(base: Scene, places: Array) -> Scene:
     return base if moved is mesh else base.replace(mesh=moved)
 
 
-def _solved(scene: Scene, state: State, held: Control) -> tuple[Scene, State]:
-    potential = potential_of(scene)
-    found: NewtonResult = solved_in(potential, held, state.evaluation.potential, state.x, state.pressure, damped=True)
+def _solved(scene: Scene, state: State, solve: Solve) -> tuple[Scene, State]:
+    found = solve(potential_of(scene), state)
     if found.status is not Status.CONVERGED:
         raise SolveError("the equilibrium was not found on elements that end at the borders of its zones", status=found.status)
     return scene, State.of(found, state.iterations)
@@ -153,7 +163,7 @@ class _Borders:
         at = np.array([int(np.abs(space.ends - place).argmin()) for place in self.places])
         beyond = strains_at_ends(state.evaluation.potential, state.evaluation, state.pressure)
         values = (beyond[which, 1, at - 1] + beyond[which, 0, at]) / 2  # they agree to the order of the forces
-        slopes = np.array([self._slope(scene, state, *each) for each in zip(range(at.size), which, at, values, strict=True)])
+        slopes = self._slopes(scene, state, which, at, values, beyond)
         if self._before is not None:
             places, old = self._before
             moved = np.abs(self.places - places) > 0
@@ -166,14 +176,19 @@ class _Borders:
         self.places = self.places + step
         return float(np.abs(step).max()) / self.length
 
-    def _slope(self, scene: Scene, state: State, k: int, which: int, at: int, value: float) -> float:
-        """Of the strain at a border, on the side of it on which its zone still goes on: from the middle of that element."""
+    def _slopes(self, scene: Scene, state: State, which: list[int], at: NDArray[np.int64], values: Array, beyond: Array) -> Array:
+        """Of the strains at the borders, each on the side on which its zone still goes on: by a parabola over the element there."""
         space = state.evaluation.potential.space
-        before = bool(self.codes[k] & _BITS[which]) == (value < 0)
-        end = space.ends[at]
-        middle = end + (space.sizes[at] / 2 if before is False else -space.sizes[at - 1] / 2)
-        beyond = profile_at(scene, state.x, state.pressure, np.array([middle])).beyond
-        return float((value - beyond[which][0]) / (end - middle))  # type: ignore[index]  # a tension field has strains beyond natural width
+        wrinkled_before = [bool(self.codes[k] & _BITS[bit]) for k, bit in enumerate(which)]
+        back = np.array([before == bool(value < 0) for before, value in zip(wrinkled_before, values, strict=True)])
+        element = np.where(back, at - 1, at)
+        size = np.where(back, -1.0, 1.0) * space.sizes[element]  # the way from the border to the other end of that element
+        found = profile_at(scene, state.x, state.pressure, space.ends[at] + size / 2).beyond
+        middle = np.stack(found or ())[which, np.arange(at.size)]
+        other = beyond[which, np.where(back, 0, 1), element]
+        straight = (middle - values) / (size / 2)
+        curved = (4 * middle - 3 * values - other) / size
+        return np.where(curved * straight > 0, curved, straight)  # on the axis the strain is no number
 
     def explain(self, scene: Scene, state: State) -> bool:
         """Whether in the middle of each element the membrane is what the zones say."""
@@ -193,7 +208,7 @@ def equilibrium_on_borders(eq: Equilibrium, held: Control) -> Equilibrium:
     if eq.status.ill_posed:
         raise SolveError(f"the equilibrium is {eq.status.value}, and what a mesh finds depends on the mesh", status=eq.status)
     state = State(eq.state, eq.pressure, eq.potential.evaluate(eq.state, eq.pressure), eq.iterations, 0.0, eq.residual, 0.0)
-    found = put_on_borders(scene, scene, state, held)
+    found = put_on_borders(scene, scene, state, holding(held))
     if found.scene is scene:
         return eq
     state = found.state

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .folders import Changes, OwnScene, System, finished, own_of, read, units_of
-from .outcome import DONE, say
+from .outcome import DONE, say, written_in_words
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -50,7 +50,7 @@ def explore(
     if changes:
         raise InputError("--set", changes[0], "allowed with --live only: a finished run has its scene")
     page = write(source, out, units or "scaled", own_of(own))
-    say(f"written:\n  {page}\n")
+    say(written_in_words("", [page]))
     return DONE
 
 

@@ -13,7 +13,20 @@ from .explore import check_explorer
 from .explore import write as write_explorer
 from .folders import Changes, System, finished, read, units_of, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
+from .outcome import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    NOT_CONVERGED,
+    NOT_WRITTEN,
+    count,
+    explain,
+    fail,
+    not_written,
+    refused,
+    say,
+    written_in_words,
+)
 from .progress import observer
 from .report import write as write_report
 
@@ -105,7 +118,7 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    say(_summary(branch, written))
+    say(written_in_words(f"{count(len(branch))}, ", written))
     return DONE
 
 
@@ -186,8 +199,3 @@ def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:
     if not refused(error):
         return f"{not_written(error, out)}" + (f"; {kept}" if saved else "")
     return f"{not_written(error, out)}; " + (f"{kept}: make room, and --resume writes the rest" if saved else "make room")
-
-
-def _summary(branch: Branch, written: Sequence[Path]) -> str:
-    lines = [f"{count(len(branch))}, written:", *(f"  {path}" for path in written)]
-    return "\n".join(lines) + "\n"

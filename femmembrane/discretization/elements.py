@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import skfem
 from numpy.typing import NDArray
 from skfem.element import ElementLineP1, ElementLineP2, ElementLinePp
 
 from .meridian import Array
+
+#: most points at which shape functions are remembered
+_FEW = 32
 
 
 def line_element(degree: int) -> skfem.Element:
@@ -33,6 +38,19 @@ def meridian_order(line: skfem.MeshLine, element: skfem.Element) -> tuple[NDArra
 
 def shape_functions(degree: int, xi: Array) -> tuple[Array, Array]:
     """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
+    xi = np.ascontiguousarray(xi, dtype=float)
+    return _shape_functions(degree, xi.tobytes()) if xi.size <= _FEW else _tabulated(degree, xi)
+
+
+@lru_cache(maxsize=64)
+def _shape_functions(degree: int, xi: bytes) -> tuple[Array, Array]:
+    """The same, remembered: every space of a degree asks at the same points."""
+    value, slope = _tabulated(degree, np.frombuffer(xi))
+    value.flags.writeable = slope.flags.writeable = False
+    return value, slope
+
+
+def _tabulated(degree: int, xi: Array) -> tuple[Array, Array]:
     element = line_element(degree)  # a new one: ElementLinePp remembers its values by the number of points alone
     table = [element.lbasis(np.asarray(xi)[None, :], k) for k in _local_order(degree)]
     value = np.stack([t[0] for t in table], axis=1)

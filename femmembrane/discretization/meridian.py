@@ -364,7 +364,18 @@ def on_borders(mesh: Any, places: Array, fixed: Sequence[float] = ()) -> Any:
     """
     ends = mesh.breakpoints()
     moved = through(ends, places, fixed)
-    return mesh if moved is ends else mesh.on_ends(moved)
+    return mesh if moved is ends else on_own_ends(mesh, moved)
+
+
+def on_own_ends(mesh: Any, ends: Array) -> Any:
+    """A mesh with other ends, chosen for the accuracy that it was chosen for itself.
+
+    Parameters
+    ----------
+    mesh : Meridian
+    ends : ndarray
+    """
+    return mesh.on_ends(ends, getattr(mesh, "accuracy", None), getattr(mesh, "estimated", None))
 
 
 def through(ends: Array, places: Array, fixed: Sequence[float] = ()) -> Array:
@@ -430,7 +441,7 @@ def check_accuracy(mesh: Any, places: str, *, given: bool) -> None:
         key = places if mesh.estimated is None else "estimated"
         raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
     if mesh.open and given:
-        key = next(key for key in ("elements", "divisions", "ratio") if getattr(mesh, key, None) not in (None, 1))
+        key = next(key for key in ("divisions", "elements", "ratio") if getattr(mesh, key, None) not in (None, 1))
         raise InputError(f"mesh.{key}", getattr(mesh, key), chosen)
     if mesh.estimated is not None:
         object.__setattr__(mesh, "estimated", float(mesh.estimated))

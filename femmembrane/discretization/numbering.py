@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import skfem
 from numpy.typing import ArrayLike, NDArray
@@ -115,7 +117,7 @@ class Numbering:
         line = skfem.MeshLine(self.ends)
         element = line_element(degree)
         local, n_nodes = meridian_order(line, element)
-        points, weights = _at_ends() if quadrature == 0 else get_quadrature(element, quadrature or 2 * degree + 1)
+        points, weights = _at_ends() if quadrature == 0 else _quadrature(degree, quadrature or 2 * degree + 1)
         self.n_elements, self.n_quadrature = line.nelements, points.shape[1]
         self.points: Array = points[0]
         self._quadrature: Array = weights
@@ -335,6 +337,14 @@ def band_of(gather: NDArray[np.int64], n_free: int) -> int:
     inside = gather < n_free
     low, high = np.where(inside, gather, n_free).min(axis=0), np.where(inside, gather, -1).max(axis=0)
     return int((high - low).max(initial=0))
+
+
+@lru_cache(maxsize=64)
+def _quadrature(degree: int, exact: int) -> tuple[Array, Array]:
+    """Points and weights on the reference element, found once."""
+    points, weights = get_quadrature(line_element(degree), exact)
+    points.flags.writeable = weights.flags.writeable = False
+    return points, weights
 
 
 def _at_ends() -> tuple[Array, Array]:

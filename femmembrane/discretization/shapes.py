@@ -320,7 +320,7 @@ class Sphere(_Graded):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cylinder(_Graded):
+class Tube(_Graded):
     """Tube of unit radius about the axis, from the top down: R = 1, Z = length/2 - s, 0 <= s <= length.
 
     Parameters
@@ -549,7 +549,7 @@ def cylinder(
     *,
     ends: Sequence[float] | None = None,
     accuracy: Asked | None = None,
-) -> Cylinder:
+) -> Tube:
     """Mesh of a tube of unit radius about the axis.
 
     Parameters
@@ -568,12 +568,12 @@ def cylinder(
 
     Returns
     -------
-    Cylinder
+    Tube
 
     Raises
     ------
     InputError
-        As for :class:`Cylinder`.
+        As for :class:`Tube`.
 
     Examples
     --------
@@ -585,7 +585,7 @@ def cylinder(
     >>> print(f"P = {eq.pressure:.4f}, lid at {eq.center_height:.4f}")
     P = 0.5121, lid at 1.0387
     """
-    return Cylinder(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
+    return Tube(length=length, elements=elements, ratio=ratio, top=top, bottom=bottom, ends=ends, accuracy=accuracy)  # type: ignore[arg-type]  # checked there
 
 
 def torus(aspect: float, elements: int | None = None, *, ends: Sequence[float] | None = None, accuracy: Asked | None = None) -> Torus:

@@ -25,7 +25,7 @@ import numpy as np
 from ..checks import number, only, store, switch
 from ..errors import InputError
 from .magnetics import Array, Source, check_source
-from .obstacles import CylinderObstacle
+from .obstacles import Cylinder
 from .outline import Outline
 from .scales import Scales
 
@@ -137,12 +137,12 @@ class Magnet(Source):
             check_source(self)
 
     @property
-    def obstacle(self) -> CylinderObstacle | None:
+    def obstacle(self) -> Cylinder | None:
         """What the membrane cannot enter; None without a body. Next to the edges themselves the field is infinite."""
         if not self.body:
             return None
         coat = 0.1 * min(self.radius, self.length / 2)
-        return CylinderObstacle(self.height, self.radius + coat, self.length + 2 * coat, rounding=coat)
+        return Cylinder(self.height, self.radius + coat, self.length + 2 * coat, rounding=coat)
 
     @property
     def magnetization(self) -> Any:

@@ -243,7 +243,7 @@ class Ball(Obstacle):
 
 
 @dataclass(frozen=True)
-class CylinderObstacle(Obstacle):
+class Cylinder(Obstacle):
     """A rigid cylinder around the axis with rounded edges; ``cylinder`` in scene files.
 
     Parameters

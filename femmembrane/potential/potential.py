@@ -664,7 +664,7 @@ def _plain(scene: Scene) -> Scene:
         electric = scene.electric.plain(scene.scales)
     ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
     plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
-    return scene.replace(title="", run=None, analysis=type(scene.analysis)(), **plain)
+    return scene.replace(title="", follow_zones=False, run=None, analysis=type(scene.analysis)(), **plain)
 
 
 def require_elements(scene: Scene) -> None:

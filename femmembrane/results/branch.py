@@ -251,7 +251,8 @@ class Branch(Sequence[Equilibrium]):
             As for :meth:`.Equilibrium.sensitivity`; or ``limit_pressure``, ``limit_volume``, ``limit_height`` of the first limit point.
             Any other one is asked of itself: ``branch.special_points[1].sensitivity(...)``.
         to, held, r, control, azimuthal
-            As for :meth:`.Equilibrium.sensitivity`. At a limit point nothing is held.
+            As for :meth:`.Equilibrium.sensitivity`; over a number of the scene, what the run holds is held by default. At a limit point
+            nothing is held.
 
         Returns
         -------

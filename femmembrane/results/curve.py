@@ -165,7 +165,8 @@ class BranchCurve:
         """The points that are known, cut where the membrane snaps, each with what lies before it."""
         branch, inside = self.branch, specials_between(self.branch)
         snaps = {jump.index: jump for jump in branch.jumps if 0 < jump.index < len(branch)}
-        steps = [CurvePoint(equilibrium, k, None, self._node(equilibrium)) for k, equilibrium in enumerate(branch)]
+        known = [equilibrium.of_branch for equilibrium in branch]  # all in one space
+        steps = [CurvePoint(equilibrium, k, None, self._node(equilibrium)) for k, equilibrium in enumerate(known)]
         chains: list[list[tuple[_Place, CurvePoint]]] = [[((-1, False), point) for point in steps[:1]]]
         for k, (before, after) in enumerate(pairwise(steps)):
             chains[-1] += [((k, False), self._special(point)) for point in inside[k]]
@@ -184,7 +185,7 @@ class BranchCurve:
 
     def _foot(self, jump: Jump) -> CurvePoint | None:
         """The state at the load of a snap on the branch that it landed on: followed back from the landing."""
-        limit, landing = jump.limit, jump.landing
+        limit, landing = jump.limit, jump.landing.of_branch
         held = jump.held or (HELD_AT.get(str(limit.kind), "") if limit else "")
         if self.branch.over or limit is None or held not in CONTROLS or not self._same(landing, limit.equilibrium):
             return None

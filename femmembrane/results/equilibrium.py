@@ -36,6 +36,8 @@ Key = tuple[Hashable, ...]
 T = TypeVar("T")
 #: kinds of answers that hold in every scene with the same potential; zones go by stresses, which the scales of a scene enter
 _OF_POTENTIAL = ("verdict", "errors", "tangent", "contact")
+#: kinds of answers that hold on to the potential
+_WITH_POTENTIAL = ("contact",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,8 @@ class Equilibrium:
         Energy of the loads besides the pressure, in units of mu T R0^2, with the 2 pi; 0 without loads.
     electric_energy : float
         Energy of a voltage (with what its source gives) or of a charge, in the same units; 0 without.
+    on_branch : Equilibrium or None
+        Of a run whose elements follow the zones: the state on the mesh of the branch that was put on its own. None for any other.
 
     Examples
     --------
@@ -94,7 +98,12 @@ class Equilibrium:
     gas: Gas | None = field(default=None, repr=False)
     load_energy: float = field(default=0.0, repr=False)
     electric_energy: float = field(default=0.0, repr=False)
+    on_branch: Equilibrium | None = field(default=None, repr=False)
     _answers: dict[Key, Any] = field(default_factory=dict, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy has: answers that belong to a potential are found anew, as another process builds its own."""
+        return {**vars(self), "_answers": {key: answer for key, answer in self._answers.items() if key[0] not in _WITH_POTENTIAL}}
 
     @property
     def energy(self) -> float:
@@ -168,6 +177,11 @@ class Equilibrium:
         if chamber is None:
             return float("nan") if self.gas is None else self.gas.amount
         return chamber.amount(self.pressure, self.volume)
+
+    @property
+    def of_branch(self) -> Equilibrium:
+        """The state on the mesh of its branch: itself, unless its elements follow zones."""
+        return self if self.on_branch is None else self.on_branch
 
     def in_scene(self, scene: Scene) -> Equilibrium:
         """The same equilibrium in a scene with the same potential, which may have other scales and other analyses.

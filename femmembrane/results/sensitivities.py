@@ -86,12 +86,13 @@ class _Derived:
         """The quantity without SI units, and what its derivative is multiplied by."""
         if name in DIFFERENTIABLE:
             return name, 1.0
-        scales, stem = self.eq.scene.scales, str(name).rpartition("_")[0]
-        if scales is not None and stem in DIFFERENTIABLE and quantity(stem).si:
-            from ..quantities import in_si
+        from ..quantities import in_si
 
-            if in_si(stem) == name:
-                return stem, float(scales.to_si(quantity(stem).si, 1.0))
+        scales = self.eq.scene.converter
+        for stem in DIFFERENTIABLE:
+            kind = quantity(stem).si
+            if scales is not None and kind and in_si(stem) == name and scales.converts(kind):
+                return stem, float(scales.to_si(kind, 1.0))
         raise unknown_name("of", name, DIFFERENTIABLE)
 
     def _of(self, name: str) -> list[Answer]:
@@ -207,6 +208,8 @@ def sensitivity_along(branch: Branch, of: Any, to: Any, held: str | None, along:
         inside = sensitivity_of_point(_first_limit(branch, of), [OF_LIMIT[name] for name in quantities], to, along)
         named = {name: inside[OF_LIMIT[name]] for name in quantities}
         return named[of] if isinstance(of, str) else named
+    if held is None and branch.hold:
+        held = next(iter(branch.hold))
     found = [sensitivity_of(eq, of, to, held, along) for eq in branch]
     return _stacked(found)
 

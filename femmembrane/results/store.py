@@ -27,6 +27,7 @@ from .branch import Branch
 from .netcdf import read_dataset, reason, write_dataset
 from .stored_points import (
     LIMIT,
+    ON_BRANCH,
     SPECIAL,
     equilibria_of,
     equilibrium_variables,
@@ -165,14 +166,18 @@ def _profile_variables(branch: Branch) -> dict[str, Variable]:
     table = columns(branch)  # the largest electric field has the name of the field, of which there is a value at each node as well
     names = {key: f"{key}_profile" if key in table else key for key in profiles[0] if key not in places}
     values = {name: (("step", "node"), np.array([p[key] for p in profiles])) for key, name in names.items()}
+    if any(e.on_branch is not None for e in branch):  # each equilibrium has its own nodes
+        return {**{key: (("step", "node"), np.array([p[key] for p in profiles])) for key in places}, **values}
     return {**{key: (("node",), np.array(profiles[0][key])) for key in places}, **values}
 
 
 def _describe(name: str) -> dict[str, str]:
     prefix = next((p for p in (SPECIAL, LIMIT) if name.startswith(p)), "")
-    base = name.removeprefix(prefix).removeprefix("equilibrium_")
+    own = name.removeprefix(prefix).removeprefix("equilibrium_")
+    base = own.removeprefix(ON_BRANCH)
     known = known_quantity(base)
-    return {"long_name": known.meaning if base == name else f"{known.meaning}, at the special point", "units": known.unit}
+    where = ("" if own == name else ", at the special point") + ("" if base == own else ", on the mesh of the branch")
+    return {"long_name": known.meaning + where, "units": known.unit}
 
 
 def _attributes(branch: Branch) -> dict[str, Any]:

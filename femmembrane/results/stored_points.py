@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.meridian import on_own_ends
 from ..errors import Status
 from ..quantities import typed
 from ..scene.variation import Parameter
@@ -43,6 +44,8 @@ _SCALARS = (
 _SPECIAL_NUMBERS = ("volume", "pressure", "center_height", "error", "azimuthal")
 #: prefix of the variables of special points and of the folds before snaps, which is also the name of their dimension
 SPECIAL, LIMIT = "special_", "limit_"
+#: prefix of the variables of the states on the mesh of the branch, where elements follow zones
+ON_BRANCH = "branch_"
 
 
 def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str = "") -> dict[str, Variable]:
@@ -59,7 +62,17 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
         prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
         prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
         prefix + "state": ((dimension, "coefficient"), np.array([e.state for e in equilibria]).reshape(len(equilibria), width)),
+        **_own_meshes(equilibria, width, dimension, prefix),
     }
+
+
+def _own_meshes(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str) -> dict[str, Variable]:
+    """Where elements follow zones: the ends of the elements of each equilibrium, and the states on the mesh of the branch."""
+    if all(e.on_branch is None for e in equilibria):
+        return {}
+    ends = np.array([e.scene.mesh.breakpoints() for e in equilibria])
+    states = equilibrium_variables([e.of_branch for e in equilibria], width, dimension, prefix + ON_BRANCH)
+    return {prefix + "element_ends": ((dimension, "element_end"), ends), **states}
 
 
 def _border_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str) -> dict[str, Variable]:
@@ -94,6 +107,13 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
         scenes = [scene.bordered(borders) for borders in _borders_of(dataset, prefix)]
     if over:
         scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
+    on_branch: list[Equilibrium | None] = [None] * count
+    if prefix + "element_ends" in dataset:  # elements follow zones
+        ends = _finite(dataset, prefix + "element_ends", count, scene.mesh.elements + 1)
+        states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
+        for k, own in enumerate(ends):
+            if not np.array_equal(own, scene.mesh.breakpoints()):
+                on_branch[k], scenes[k] = states_there[k], scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, own))
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},
@@ -101,6 +121,7 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
             status=Status(str(dataset[prefix + "status"].values[k])),
             scene=scenes[k],
             state=states[k],
+            on_branch=on_branch[k],
         )
         for k in range(count)
     ]

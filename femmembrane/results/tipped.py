@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import files
+from .. import files, memory
 from ..checks import choice, whole
 from ..errors import Status, printable, unknown_name
 from ..quantities import PLACES, words, written
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
+#: bytes for a point of a surface: its four numbers, and what they are computed from
+_BYTES = 64
 #: columns of the table of a branch, between the step and the verdicts that the scene asks for
 COLUMNS = (*PLACES, "amplitude", "shift", "energy", "harmonics", "truncation", "residual", "iterations")
 
@@ -155,9 +157,11 @@ class TippedEquilibrium:
         Raises
         ------
         InputError
-            For fewer than 3 angles.
+            For fewer than 3 angles, and for more than there is memory for.
         """
-        angles = 2 * np.pi * np.arange(whole("sectors", sectors, least=3)) / sectors
+        whole("sectors", sectors, least=3)
+        memory.require("sectors", int(sectors), _BYTES * (self.scene.mesh.elements * self.scene.degree + 1), "angles")
+        angles = 2 * np.pi * np.arange(sectors) / sectors
         found: dict[str, Array] = door.tipped_surface(self, angles)
         return found
 

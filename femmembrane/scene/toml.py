@@ -42,7 +42,7 @@ from ..checks import choice, number, sequence
 from ..discretization.curve import Curve
 from ..discretization.meridian import Disc, Meridian
 from ..discretization.mesh_files import read_meridian
-from ..discretization.shapes import Annulus, Cap, Cylinder, Sphere, Torus
+from ..discretization.shapes import Annulus, Cap, Sphere, Torus, Tube
 from ..errors import InputError, unknown_name
 from ..physics.along import Along
 from ..physics.chamber import Chamber
@@ -55,7 +55,7 @@ from ..physics.magnetics import Dipole
 from ..physics.magnets import Magnet
 from ..physics.materials import MooneyRivlin, NeoHookean, Ogden, Varga
 from ..physics.named import material
-from ..physics.obstacles import Ball, CylinderObstacle, Mould, Plane
+from ..physics.obstacles import Ball, Cylinder, Mould, Plane
 from ..physics.scales import Scales
 from ..physics.sources import Loop, Solenoid, Uniform, Wire
 from ..physics.tabulated import Tabulated
@@ -92,13 +92,13 @@ SOURCES: dict[str, Any] = {
     "wire": Wire,
 }
 LOADS: dict[str, Any] = {"hub-force": HubForce, "hydrostatic": Hydrostatic, "weight": Weight}
-OBSTACLES: dict[str, Any] = {"ball": Ball, "cylinder": CylinderObstacle, "mould": Mould, "plane": Plane}
+OBSTACLES: dict[str, Any] = {"ball": Ball, "cylinder": Cylinder, "mould": Mould, "plane": Plane}
 SHAPES: dict[str, Any] = {
     "disc": Disc,
     "annulus": Annulus,
     "cap": Cap,
     "sphere": Sphere,
-    "cylinder": Cylinder,
+    "cylinder": Tube,
     "torus": Torus,
     "curve": Curve,
 }
@@ -109,7 +109,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
         *("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
-    "mesh": ("degree",),
+    "mesh": ("degree", "follow_zones"),
     "effects": ("tension_field", "demagnetization", "bending"),
     "output": ("vtu",),
 }
@@ -227,7 +227,11 @@ def tables_of(scene: Scene, record: bool = False) -> dict[str, Any]:
         "source": [_describe("source", "kind", SOURCES, source, record) for source in scene.sources],
         "load": [_describe("load", "kind", LOADS, load, record) for load in scene.loads],
         "obstacle": [_describe("obstacle", "kind", OBSTACLES, body, record) for body in scene.obstacles],
-        "mesh": {**_describe("mesh", "shape", SHAPES, scene.mesh, record), **{name: getattr(scene, name) for name in SCENE_KEYS["mesh"]}},
+        "mesh": {
+            **_describe("mesh", "shape", SHAPES, scene.mesh, record),
+            "degree": scene.degree,
+            **({"follow_zones": True} if scene.follow_zones else {}),
+        },
         "run": _arguments(scene.run) if scene.run else {},
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},
         "scales": _arguments(scene.scales) if scene.scales else {},

@@ -72,6 +72,9 @@ class Scene:
         R0/T > 0; it enters the total stresses, and bending. Left out: the ratio of the scales, or 1000 without scales.
     tension_field : bool
         Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
+    follow_zones : bool
+        Whether ends of elements follow the borders of the zones of a tension field: each equilibrium of a run then has as many elements as
+        the mesh, and ``eq.scene.mesh`` has its own ends (:meth:`.Equilibrium.on_borders`). Without a tension field it does nothing.
     title : str
         Up to 1000 characters.
     run : Run, optional
@@ -141,6 +144,7 @@ class Scene:
     susceptibility: float | None = None
     radius_to_thickness: float = None  # type: ignore[assignment]  # a float as soon as the scene is made
     tension_field: bool = False
+    follow_zones: bool = field(default=False, kw_only=True)
     title: str = ""
     run: Run | None = None
     analysis: Analysis = field(default_factory=Analysis)
@@ -203,6 +207,7 @@ class Scene:
             susceptibility=_susceptibility("membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=switch("effects.tension_field", self.tension_field),
+            follow_zones=switch("mesh.follow_zones", self.follow_zones),
             title=_text("title", self.title),
             thickness=Along.of("membrane.thickness", self.thickness),
             modulus=Along.of("membrane.modulus", self.modulus),
@@ -327,6 +332,11 @@ class Scene:
     def open(self) -> bool:
         """Whether the elements are still to be chosen, for the accuracy that is asked for: nothing can be computed before."""
         return bool(getattr(self.mesh, "open", False))
+
+    @property
+    def follows_zones(self) -> bool:
+        """Whether there are borders that elements follow."""
+        return self.follow_zones and self.tension_field
 
     @property
     def bodies(self) -> tuple[Obstacle, ...]:

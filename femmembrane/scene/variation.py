@@ -62,6 +62,9 @@ _POWERS: Mapping[str, tuple[float, float]] = {
     "energy": (1.0, 1.0),
     "gas": (1.0, 1.0),
     "stress": (0.0, 1.0),
+    "charge": (0.0, 0.5),
+    "capacitance": (-1.0, 0.0),
+    "electric_field": (0.0, 0.5),
 }
 #: parts of a scene that are lists, by their names
 _LISTS = {"source": "sources", "load": "loads"}

@@ -461,6 +461,8 @@ def start_at_height(potential: Potential, height: float) -> State:
     """The equilibrium with a height of the pole, followed from the moderately inflated membrane."""
     if at_rest(potential, CONTROLS["center_height"], height):
         return flat_state(potential)
+    if potential.space.on_axis[0] and any(float(body.gap(0.0, height)[0]) < 0 for body in potential.obstacles):
+        raise SolveError(f"a pole at the height {height:.6g} would be inside a body", status=Status.NO_EQUILIBRIUM)
     sides = _sides(height - potential.space.first_height * (not potential.flat))
     size = moderate(potential)
     if potential.flat and not potential.surrounded:  # a branch leads past the flat membrane, which has no stiffness, nowhere near it

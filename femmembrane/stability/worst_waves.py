@@ -128,7 +128,8 @@ def _limit(potential: Potential, x: Array, pressure: float, evaluation: Evaluati
         down = np.maximum(-s2, 0.0)
         square = (down + np.sqrt(down**2 + 4 * d22 * gain)) / (2 * d22)
     else:
+        nothing = np.where(s2 < 0, np.inf, 0.0)  # where nothing is gained, only a compression lets short waves grow
         with np.errstate(divide="ignore", over="ignore"):
-            square = gain / np.maximum(s2, 0.0)
+            square = np.divide(gain, np.maximum(s2, 0.0), out=nothing, where=gain > 0)
     largest = float((r.rho * np.sqrt(square)).max())
     return int(min(max(largest, _FIRST), MAX_WAVES)) if np.isfinite(largest) else MAX_WAVES

@@ -106,7 +106,7 @@ def zones_along(branch: Branch) -> ZonesAlong:
         if id(b) in landings:
             snaps.add(len(zones))
         else:
-            for t, between in _changing(a, b, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS):
+            for t, between in _changing(a.of_branch, b.of_branch, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS):
                 steps.append(k + t)
                 zones.append(between)
         steps.append(k + 1.0)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..accuracy.borders import holding
 from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, profile_norms
 from ..checks import only, switch
 from ..errors import SolveError, Status
@@ -23,7 +24,7 @@ from ..threads import one_thread
 from .arguments import check_increasing, check_scene
 from .follow import equilibrium, run
 from .over_number import Hold
-from .state_records import record
+from .state_records import record_on_borders
 from .trace import trace
 
 #: least number of elements of the reference, all of the highest degree
@@ -181,7 +182,7 @@ class _Study:
         result = correct(potential, self.control, guess, start.pressure, damped=True, max_iterations=40)
         if result.status is not Status.CONVERGED:
             raise SolveError(f"{elements} elements of degree {degree}: the equilibrium was not found there", status=result.status)
-        return record(scene, potential, State.of(result))
+        return record_on_borders(scene, State.of(result), holding(self.control))
 
     def measured(self, eq: Equilibrium) -> dict[str, float]:
         limit = self._first_limit(eq) if self.limit_points else {}

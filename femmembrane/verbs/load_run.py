@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy.adapt import spread
+from ..accuracy.borders import holding
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -21,7 +22,7 @@ from ..results.path_memory import PathMemory
 from ..results.special_point import Jump, SpecialPoint
 from ..scene import MAX_STEPS, Scene
 from ..scene.run import AT_LIMIT
-from ..solve.controls import CONTROLS, ControlKind, Controlled, Gas, check_height
+from ..solve.controls import CONTROLS, Control, ControlKind, Controlled, Gas, check_height
 from ..solve.load_path import SOLVERS, LoadPath, Turn
 from ..solve.number_path import NumberPath
 from ..solve.state import State
@@ -29,7 +30,7 @@ from ..solve.wellposed import slackness
 from .arguments import kind_of, plain
 from .meshing import carried
 from .running import End, Request, Run
-from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
+from .state_records import OnStep, predictor_of, record_on_borders, remembered, restore, resume, special_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,11 +168,11 @@ class LoadRun(Run[Branch]):
         try:
             with self.timed("solve"):
                 state, turn = self.path.to(float(loads[index]), self.request.at_limit == "jump")
+            with self.timed("verdicts"):
+                own, scene = self.own(state), self.scene_of(state)
+                new = record_on_borders(scene, own, holding(self.control), self.found[-1] if self.found else None, clock, self.gas)
         except SolveError as error:
             return error.status, self._not_reached(index, str(error))
-        with self.timed("verdicts"):
-            own, scene = self.own(state), self.scene_of(state)
-            new = record(scene, own.evaluation.potential, own, self.found[-1] if self.found else None, clock, self.gas)
         if turn is not None:
             held = self.request.held.name
             self.jumps.append(Jump(index, self._limit(turn), new, held if held in CONTROLS else ""))
@@ -179,6 +180,11 @@ class LoadRun(Run[Branch]):
         if self.on_step is not None:
             self.on_step(index, len(loads), new)
         return self._slack(own) if new.status is Status.SLACK else None
+
+    @property
+    def control(self) -> Control:
+        """What holds the state at hand, at its load."""
+        return self.request.held.at(self.path.load)
 
     @property
     def gas(self) -> Gas | None:

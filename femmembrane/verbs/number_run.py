@@ -14,7 +14,7 @@ from ..potential import potential_of
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..scene import Scene
-from ..solve.controls import Controlled, Gas, GasOver
+from ..solve.controls import CONTROLS, Control, Controlled, Gas, GasOver
 from ..solve.number_path import NumberPath
 from ..solve.state import State
 from .arguments import kind_of
@@ -96,6 +96,10 @@ class NumberRun(OverNumber, LoadRun):
 
     def restored(self, last: Equilibrium, load: float) -> State:
         return restore(self.family, last, load)
+
+    @property
+    def control(self) -> Control:
+        return self.gas or CONTROLS[self.request.hold.name].at(self.request.hold.value)
 
     @property
     def gas(self) -> Gas | None:

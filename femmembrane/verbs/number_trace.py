@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..accuracy.borders import Solve, holding
 from ..checks import choice, number, sign
 from ..errors import InputError, Status
 from ..potential import potential_of
@@ -26,7 +27,7 @@ from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_point
 from ..solve.state import State
 from .arguments import check_ill_posed, check_max_steps
-from .over_number import AT_REST, Hold, OverNumber, checked_number, family_of
+from .over_number import AT_REST, Hold, OverNumber, checked_number, family_of, gas_of
 from .running import End
 from .state_records import OnStep, restore
 from .trace_run import Start, TraceRequest, TraceRun, first_state
@@ -167,6 +168,11 @@ class NumberTraceRun(OverNumber, TraceRun):
         if name == GAS:
             return replace(self.request.hold, name=GAS).controlled(self.scene)
         return NUMBER if name == self.request.over else name
+
+    def solve(self, point: BranchPoint) -> Solve:
+        scene = self.scene_of(point.state)  # whose chamber may be what changes
+        hold = self.request.hold
+        return holding(CONTROLS[hold.name].at(hold.value) if hold.name in CONTROLS else gas_of(scene, "hold").at(hold.value))
 
     def place(self, point: BranchPoint) -> str:
         state = point.state

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..accuracy.borders import holding
 from ..checks import number, only
 from ..potential import potential_of
 from ..results.equilibria import Equilibria
 from ..scene import Scene
+from ..solve.controls import CONTROLS
 from ..solve.search import Search
 from ..threads import one_thread
 from .arguments import check_max_steps, check_scene
-from .state_records import record
+from .state_records import record_on_borders
 
 
 @one_thread
@@ -45,7 +47,7 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     potential = potential_of(scene)
     search = Search(potential, control, load, max_steps)
     search.run()
-    found = [record(scene, potential, state) for state in search.states]
+    found = [record_on_borders(scene, state, holding(CONTROLS[control].at(load))) for state in search.states]
     energies = [eq.energy - eq.pressure * eq.volume * (control == "pressure") for eq in found]
     order = np.argsort(energies, kind="stable")
     return Equilibria(control, float(load), tuple(found[k] for k in order), tuple(float(energies[k]) for k in order), _searched(search))

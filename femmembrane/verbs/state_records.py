@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
@@ -36,6 +37,7 @@ def resume(potential: Potential, start: Equilibrium) -> State:
     """The solver's state of a recorded equilibrium, of this scene or of another scene with the same mesh and degree."""
     if not isinstance(start, Equilibrium):
         raise InputError("start", start, "an Equilibrium is allowed")
+    start = start.of_branch
     if start.state.shape != (potential.space.n_free,):
         raise InputError("start", start, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     x = start.state
@@ -52,13 +54,15 @@ def resume(potential: Potential, start: Equilibrium) -> State:
 def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> State:
     """The solver's state of an equilibrium of this very scene, to the last bit: it is looked at, not solved again.
 
-    In a family of scenes it is one of the scene with a value of the number.
+    In a family of scenes it is one of the scene with a value of the number. Where elements follow zones it is the state on the mesh of the
+    branch.
 
     Raises
     ------
     InputError
         When it is no equilibrium of the scene.
     """
+    kept = kept.of_branch
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     if potential.obstacles:
@@ -103,6 +107,30 @@ def record(
     if clock is not None:  # written last, for answers take time
         store(equilibrium, seconds=time.perf_counter() - clock)
     return equilibrium
+
+
+def record_on_borders(
+    scene: Scene, state: State, solve: Solve, previous: Equilibrium | None = None, clock: float | None = None, gas: Gas | None = None
+) -> Equilibrium:
+    """The record of a state, put on elements that end at the borders of its zones where the scene wants that.
+
+    An ill-posed state depends on the mesh, and stays on its own.
+
+    Raises
+    ------
+    SolveError
+        Where it is lost on the way.
+    """
+    potential = state.evaluation.potential
+    if not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
+        return record(scene, potential, state, previous, clock, gas)
+    found = put_on_borders(scene, scene, state, solve)
+    if found.scene is scene:
+        return record(scene, potential, state, previous, clock, gas)
+    new = record(found.scene, found.state.evaluation.potential, found.state, previous, clock, gas)
+    there = potential, state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    store(new, on_branch=recorded(scene, *there))
+    return new
 
 
 def special_point(run: Run[Branch], scene: Scene, located: Located[BranchPoint], azimuthal: int = 0) -> SpecialPoint:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
 
 import numpy as np
 
+from ..accuracy.borders import Solve, holding
 from ..checks import choice, is_number, number, sign
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -24,6 +25,7 @@ from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS, check_height
+from ..solve.finer_space import met_across
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
 from ..solve.start import start_at_volume, usual_volume
@@ -34,7 +36,10 @@ from .arguments import check_ill_posed, check_max_steps
 from .meshing import carried
 from .over_number import gas_of
 from .running import End, Request, Run
-from .state_records import OnStep, predictor_of, record, remembered, restore, resume, special_point
+from .state_records import OnStep, predictor_of, record_on_borders, remembered, restore, resume, special_point
+
+#: distance from a value at which a trace ends, in units of the membrane, that is none
+_AT_TARGET = 1e-9
 
 #: most numbers of waves that are tried one after the other for the first onset of all
 _MOST_WAVES = 20
@@ -276,7 +281,7 @@ class TraceRun(Run[Branch]):
 
     def same(self, scene: Scene) -> Scene:
         """A scene of the branch that is continued, with the analyses of this one."""
-        return self.scene
+        return self.scene if scene.mesh == self.scene.mesh else self.scene.replace(mesh=scene.mesh)
 
     # --- how it is stepped
 
@@ -374,10 +379,19 @@ class TraceRun(Run[Branch]):
         height = self.potential.space.center_height(point.state.x)
         return f"pole height {height:.4g} (V = {point.state.volume:.6g}, P = {point.state.pressure + 0.0:.6g})"
 
+    def solve(self, point: BranchPoint) -> Solve:
+        """What finds a point on other elements: the plane across the branch, or the value at which the branch is to end."""
+        for name, value in self.request.targets.items():
+            unit = self.potential.space.units.get(name, 0.0)
+            if name in CONTROLS and abs(float(point.state.value_of(CONTROLS[name])) - value) <= _AT_TARGET * unit:
+                return holding(CONTROLS[name].at(value))
+        potential = self.potential_at(point)
+        return lambda onto, _: met_across(onto, potential, point)
+
     def _add(self, point: BranchPoint, clock: float) -> None:
         with self.timed("verdicts"):
             scene, state = self.scene_of(point.state), self.own(point.state)
-            new = record(scene, state.evaluation.potential, state, self.found[-1] if self.found else None, clock)
+            new = record_on_borders(scene, state, self.solve(point), self.found[-1] if self.found else None, clock)
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.request.max_steps + 1, new)

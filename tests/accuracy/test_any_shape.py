@@ -128,6 +128,12 @@ def test_accuracies_that_are_refused(given, key, text):
     assert text in str(caught.value)
 
 
+def test_what_contradicts_an_accuracy_is_named_as_it_was_given():
+    with pytest.raises(fm.InputError, match="for which the mesh is chosen") as error:
+        fm.meridian_from_points([(1.0, 0.5), (1.0, -0.5)], accuracy=1e-6, divisions=3)
+    assert (error.value.key, error.value.value) == ("mesh.divisions", 3)
+
+
 @pytest.mark.parametrize("mesh", [fm.cylinder(3.0, accuracy=1e-5), fm.meridian_from_points([(1.0, 0.5), (1.0, -0.5)], accuracy=1e-5)])
 def test_a_trace_of_a_shape_whose_first_end_is_held(mesh):
     """No height is compared where none moves; the limit point of a tube, against the same mesh with finer elements."""

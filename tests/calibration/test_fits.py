@@ -496,7 +496,7 @@ def test_pictures_and_pages(tmp_path):
     found = fm.fit(scene(fm.Gent(60.0)), gent_data(), ["material.mu", "material.jm"], noise="1 %")
     figure = found.plot(tmp_path / "fit.png")
     assert (tmp_path / "fit.png").stat().st_size > 10_000
-    assert [axes.get_xlabel() for axes in figure.axes] == ["", "center_height"]
+    assert [axes.get_xlabel() for axes in figure.axes] == ["", "pole height η(0)/R₀"]
     found.report(tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 1

@@ -125,7 +125,7 @@ def test_who_is_asked():
         "error_estimates": ["ErrorEstimates"],
     }
     assert asked(plain) == []
-    assert len(asked(plain.replace(analysis=fm.Analysis(**keys)))) == len(ANALYSES) - 2  # those of scales and electrodes are not
+    assert len(asked(plain.replace(analysis=fm.Analysis(**keys)))) == len(ANALYSES) - 3  # those of scales, electrodes and bodies are not
     assert [type(a).__name__ for a in asked(plain.replace(electric=fm.Electric(voltage=0.1)))] == ["Electrics"]
 
 

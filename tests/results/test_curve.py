@@ -228,3 +228,10 @@ def test_a_branch_that_was_drawn_goes_to_other_processes() -> None:
     between = branch.at(volume=0.8)
     for copied in (pickle.loads(pickle.dumps(branch)), copy.deepcopy(branch)):
         assert copied.at(volume=0.8).pressure == between.pressure
+
+
+def test_an_equilibrium_that_was_asked_for_contact_is_copied() -> None:
+    eq = fm.equilibrium(fm.Scene(fm.NeoHookean(), fm.disc(12), obstacles=[fm.Plane(0.5, "below")]), volume=1.2)
+    assert eq.contact is not None
+    copied = pickle.loads(pickle.dumps(eq)).contact
+    assert (copied.radius, copied.force) == (eq.contact.radius, eq.contact.force)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 import femmembrane as fm
 from femmembrane.results.verdict import Verdict
-from femmembrane.scene.variation import Parameter, Scale, names
+from femmembrane.scene.variation import Parameter, Scale, names, parameter_of
 from femmembrane.solve.responses import Responses
 from femmembrane.stability.eigenvalue_rates import require_simple
 from femmembrane.stability.spectrum import Pencil
@@ -81,11 +81,11 @@ SCENES: Mapping[str, tuple[fm.Scene, Mapping[str, float]]] = {
     "loads": (fm.Scene(fm.MooneyRivlin(0.1), DISC, loads=[fm.Weight(0.3), fm.Hydrostatic(0.2)]), {"volume": 1.5}),
     "prestretch": (fm.Scene(fm.NeoHookean(), DISC, prestretch=1.3), {"pressure": 0.7}),
     "rim": (fm.Scene(fm.MooneyRivlin(0.1), fm.disc(16, rim={"kind": "clamped", "radius": 1.2})), {"center_height": 0.8}),
-    "tube": (fm.Scene(fm.MooneyRivlin(0.1), fm.Cylinder(length=2.0, elements=16)), {"volume": 9.0}),
+    "tube": (fm.Scene(fm.MooneyRivlin(0.1), fm.Tube(length=2.0, elements=16)), {"volume": 9.0}),
     "two ends": (
         fm.Scene(
             fm.MooneyRivlin(0.1),
-            fm.Cylinder(
+            fm.Tube(
                 length=2.0,
                 elements=16,
                 top={"kind": "clamped", "height": 1.2, "radius": 1.1},
@@ -100,7 +100,7 @@ SCENES: Mapping[str, tuple[fm.Scene, Mapping[str, float]]] = {
     "total charge": (fm.Scene(fm.MooneyRivlin(0.1), DISC, electric=fm.Electric(total_charge=1.0)), {"volume": 1.0}),
     "frozen charge": (fm.Scene(fm.MooneyRivlin(0.1), DISC, electric=fm.Electric(frozen_charge=0.3)), {"volume": 1.0}),
     "tension field": (
-        fm.Scene(fm.MooneyRivlin(0.1), fm.Cylinder(length=2.0, elements=16, top={"kind": "clamped", "height": 1.3}), tension_field=True),
+        fm.Scene(fm.MooneyRivlin(0.1), fm.Tube(length=2.0, elements=16, top={"kind": "clamped", "height": 1.3}), tension_field=True),
         {"volume": 6.6},
     ),
 }
@@ -239,8 +239,8 @@ EIGENVALUES: Mapping[str, tuple[fm.Scene, Mapping[str, float], dict[str, Any]]] 
         {"volume": 1.0},
         {"control": "pressure"},
     ),
-    "volume of a tube": (fm.Scene(fm.MooneyRivlin(0.1), fm.Cylinder(length=2.0, elements=16)), {"volume": 9.0}, {"control": "volume"}),
-    "waves of a tube": (fm.Scene(fm.MooneyRivlin(0.1), fm.Cylinder(length=2.0, elements=16)), {"volume": 9.0}, {"azimuthal": 2}),
+    "volume of a tube": (fm.Scene(fm.MooneyRivlin(0.1), fm.Tube(length=2.0, elements=16)), {"volume": 9.0}, {"control": "volume"}),
+    "waves of a tube": (fm.Scene(fm.MooneyRivlin(0.1), fm.Tube(length=2.0, elements=16)), {"volume": 9.0}, {"azimuthal": 2}),
     "prestretch": (fm.Scene(fm.NeoHookean(), DISC, prestretch=1.3), {"pressure": 0.7}, {"control": "volume"}),
 }
 
@@ -287,6 +287,14 @@ def test_electric_quantities(electric: fm.Electric) -> None:
         return np.array([getattr(other, name) for name in of])
 
     along_numbers(scene, names(scene), answer, {name: np.array([found[q][name] for q in of]) for name in names(scene)})
+
+
+def test_what_a_run_over_a_number_holds_is_held() -> None:
+    scene = fm.Scene(fm.MooneyRivlin(0.1), DISC, sources=[fm.Dipole(20.0, 4.0)], susceptibility=1.0)
+    branch = fm.vary(scene, "source.0.height", [4.0, 4.2], hold={"pressure": 0.8})
+    held = branch.sensitivity("volume", "source.0.height", held="pressure")
+    assert (branch.sensitivity("volume", "source.0.height") == held).all()
+    assert abs(held).min() > 1e-3
 
 
 def test_electrodes_without_a_voltage() -> None:
@@ -347,6 +355,37 @@ def test_in_si_units() -> None:
     found = eq.sensitivity(["pressure", "pressure_pa", "volume_m3"], "material.ratio", held="center_height")
     assert found["pressure_pa"] == pytest.approx(scales.to_si("pressure", found["pressure"]))
     assert found["volume_m3"] == pytest.approx(0.02**3 * eq.sensitivity("volume", "material.ratio", held="center_height"))
+
+
+def test_electric_quantities_in_si_units() -> None:
+    """Against solving again with another voltage, and on a sheet that is thicker or stiffer."""
+    scales, permittivity = fm.Scales(radius=0.02, thickness=1e-3, shear_modulus=3e4), 3.0
+    scene = fm.Scene(fm.MooneyRivlin(0.1), DISC, scales=scales, electric=fm.Electric(voltage=500.0, relative_permittivity=permittivity))
+    eq = solved(scene, {"volume": 1.0})
+    of = ["voltage_v", "charge_c", "capacitance_f", "electric_field_v_per_m"]
+    found = eq.sensitivity(of, ["electric.voltage", "scales.thickness", "scales.shear_modulus"], held="volume")
+
+    def answer(changed: fm.Scene) -> Any:
+        other = solved(changed, {"volume": 1.0}, eq)
+        converter = changed.converter
+        assert converter is not None
+        kinds = {"voltage": "voltage", "charge": "charge", "capacitance": "capacitance", "electric_field": "electric_field"}
+        return np.array([converter.to_si(kind, getattr(other, name)) for name, kind in kinds.items()])
+
+    here = answer(scene)
+    for name in ("electric.voltage", "scales.thickness", "scales.shear_modulus"):
+        parameter = parameter_of(scene, name)
+        h = 1e-3 * parameter.value
+        slopes = [
+            (answer(parameter.scene_at(parameter.value + t)) - answer(parameter.scene_at(parameter.value - t))) / (2 * t)
+            for t in (h, h / 2)
+        ]
+        true = (4 * slopes[1] - slopes[0]) / 3
+        for k, q in enumerate(of):
+            assert found[q][name] * parameter.value / here[k] == pytest.approx(true[k] * parameter.value / here[k], abs=1e-7)
+    without = solved(scene.replace(electric=fm.Electric(voltage=0.1)), {"volume": 1.0})
+    with pytest.raises(fm.InputError, match="did you mean 'voltage'"):
+        without.sensitivity("voltage_v", "electric.voltage")
 
 
 def test_what_has_no_derivative_is_refused() -> None:
@@ -468,7 +507,7 @@ def test_a_scale_of_a_scene_without_units_is_unknown() -> None:
 
 def test_wrinkles_that_come_and_go() -> None:
     """In a tube that is wrinkled in part slopes change where the border passes a quadrature point: a small step sees none."""
-    scene = fm.Scene(fm.Gent(30.0), fm.Cylinder(length=2.0, elements=16), tension_field=True)
+    scene = fm.Scene(fm.Gent(30.0), fm.Tube(length=2.0, elements=16), tension_field=True)
     eq = solved(scene, {"volume": 5.5})
     parameter, h = Parameter(scene, "membrane.prestretch"), 1e-5
     after, before = (solved(parameter.scene_at(1.0 + t), {"volume": 5.5}, eq).pressure for t in (h, -h))

@@ -107,7 +107,7 @@ def test_release_under_falling_pressure():
 BODIES = {
     "plane": fm.Plane(0.5),
     "ball": fm.Ball(height=1.0, radius=0.5),
-    "cylinder": fm.CylinderObstacle(height=0.6, radius=0.4, length=0.4, rounding=0.12),
+    "cylinder": fm.Cylinder(height=0.6, radius=0.4, length=0.4, rounding=0.12),
     "mould": fm.Mould([(1.3, -0.2), (1.3, 0.4), (0.2, 0.7), (0.0, 0.7)], rounding=0.1),
 }
 
@@ -215,8 +215,8 @@ def test_between_two_equilibria_of_a_branch():
         ("obstacle", lambda: plate(0.0, elements=4)),
         ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Ball(height=0.2, radius=0.3)])),
         ("obstacle.radius", lambda: fm.Ball(height=1.0, radius=0.0)),
-        ("obstacle.length", lambda: fm.CylinderObstacle(height=1.0, radius=0.5, length=0.0)),
-        ("obstacle.rounding", lambda: fm.CylinderObstacle(height=1.0, radius=0.5, length=1.0, rounding=0.6)),
+        ("obstacle.length", lambda: fm.Cylinder(height=1.0, radius=0.5, length=0.0)),
+        ("obstacle.rounding", lambda: fm.Cylinder(height=1.0, radius=0.5, length=1.0, rounding=0.6)),
         ("obstacle.points", lambda: fm.Mould([(0.0, 1.0), (0.0, 1.0)])),
         ("obstacle.points", lambda: fm.Mould([(0.0, 1.0)])),
         ("obstacle.side", lambda: fm.Plane(0.5, side="left")),
@@ -329,6 +329,11 @@ def test_few_and_many_elements(elements):
 def test_a_membrane_deflated_away_from_a_plate_does_not_feel_it():
     bare = fm.equilibrium(fm.Scene(material=NH, mesh=fm.disc(16)), volume=-1.0)
     assert fm.equilibrium(plate(elements=16), volume=-1.0).pressure == pytest.approx(bare.pressure, rel=1e-9)
+
+
+def test_no_pole_is_inside_a_body():
+    with pytest.raises(fm.SolveError, match="inside a body"):
+        fm.equilibrium(plate(elements=8), center_height=0.6)
 
 
 def test_between_two_plates():

@@ -328,3 +328,11 @@ def test_surfaces_are_no_longer_of_revolution(tmp_path: Any) -> None:
     assert enclosed == pytest.approx(eq.volume, rel=5e-3)
     with pytest.raises(fm.InputError, match="sectors"):
         eq.surface(2)
+
+
+def test_what_is_asked_of_states_with_waves_in_a_wrong_way_is_refused() -> None:
+    state = fm.trace(tipping(), start=onset(), max_steps=1)[1]
+    with pytest.raises(fm.InputError, match="angles are allowed"):
+        state.surface(10**15)
+    with pytest.raises(fm.InputError, match=r"fm\.trace follows"):
+        list(fm.trace_iter(tipping(), start=onset()))

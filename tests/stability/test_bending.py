@@ -561,3 +561,10 @@ def test_a_sphere_bends_alike_in_all_directions() -> None:
     assert values == pytest.approx([values[0]] * 3, rel=1e-6)
     plain = fm.equilibrium(scene.replace(bending=False), volume=6.0)
     assert values[0] > 1.002 * plain.verdict("volume").smallest_eigenvalue
+
+
+def test_a_flat_membrane_at_rest_has_no_worst_number_of_waves() -> None:
+    """Nothing is taut and nothing pushes: every eigenvalue is 0, and the search ends at once."""
+    flat = fm.equilibrium(fm.Scene(fm.NeoHookean(), fm.disc(4), degree=2), volume=0.0)
+    verdict = flat.verdict(azimuthal="all")
+    assert (verdict.stable, verdict.smallest_eigenvalue, verdict.azimuthal) == (None, 0.0, 1)

@@ -59,8 +59,13 @@ def draw(upright: fm.Branch, tipped: fm.TippedBranch, path: Path) -> None:
     right.plot(*both, color=UPRIGHT, label="upright")
     cut = tipped[-1].surface(48)
     right.plot(*(np.concatenate([cut[name][::-1, 24], cut[name][:, 0]]) for name in ("x", "z")), color=LEANING, label="leaning")
-    title = f"in the plane of symmetry at V = {tipped[-1].volume:.4f}"
-    right.set(aspect="equal", xticks=(-1, -0.5, 0, 0.5, 1), xlabel="x", ylabel="z", title=title)
+    right.set(
+        aspect="equal",
+        xticks=(-1, -0.5, 0, 0.5, 1),
+        xlabel="x",
+        ylabel="z",
+        title=f"in the plane of symmetry at V = {tipped[-1].volume:.4f}",
+    )
     plots.draw_legend(right, loc="upper center", bbox_to_anchor=(0.5, -0.5), ncols=2)
     plots.save_figure(figure, path)
 

@@ -103,7 +103,7 @@ class Curve:
             raise InputError("mesh.points", f"a size of {size:.3g}", f"a size from {1 / _LARGEST:.0e} to {_LARGEST:.0e} is allowed")
         points, remarks = mended(np.array(self.points), 2 if self.curved else 1)
         object.__setattr__(self, "points", _tuples(points))
-        object.__setattr__(self, "repaired", self.repaired + remarks)
+        object.__setattr__(self, "repaired", tuple(dict.fromkeys((*self.repaired, *remarks))))  # a file may say it already
         _check_curve(self)
         object.__setattr__(self, "points", _tuples(_directed(np.array(self.points), self.curved)))
         check_accuracy(self, "ends", given=self.divisions != 1)

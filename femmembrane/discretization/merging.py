@@ -37,6 +37,10 @@ def mended(points: Array, step: int) -> tuple[Array, tuple[str, ...]]:
             points[-1] = points[0]
             remarks.append(f"the ends of the curve, {gap:.1e} apart, were joined: it is closed")
         return points, tuple(remarks)
+    if len(lengths) > 2 and gap <= _SHARE * lengths[[0, -1]].min() and not on_axis.any():
+        middle = (points[0] + points[-1]) / 2  # the same whichever way the curve runs
+        where = f"r = {middle[0]:.4g}, z = {middle[1]:.4g}"
+        remarks.append(f"the two ends, at {where}, are {gap:.1e} apart and were left so; for a closed curve let them coincide")
     for end, limit, pole in zip((0, -1), near, on_axis, strict=True):
         R, Z = points[end].tolist()
         if pole and R:

@@ -319,6 +319,21 @@ def circle(turns: np.ndarray, aspect: float = 3.0) -> np.ndarray:
     return np.stack([aspect + np.sin(turns), np.cos(turns)], axis=1)
 
 
+def test_a_ring_whose_seam_is_there_twice_but_apart_has_a_remark(tmp_path: Path) -> None:
+    """Farther apart than round-off: a slit may be meant. It is asked about in every way that a curve comes in, and once."""
+    points = circle(2 * np.pi * np.arange(61) / 60)
+    points[-1] = points[0] + np.array([0.0, -1e-4])
+    curve = fm.meridian_from_points(points)
+    assert not curve.closed
+    (remark,) = curve.repaired
+    assert "1.0e-04 apart and were left so; for a closed curve let them coincide" in remark
+    fm.write_meridian(curve, tmp_path / "slit.vtu", curved=False)
+    assert len(fm.read_meridian(tmp_path / "slit.vtu").repaired) == 1
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=curve)
+    assert fm.Scene.from_dict(scene.to_dict()) == scene
+    assert fm.Scene.from_dict(scene.to_dict()).mesh.repaired == curve.repaired
+
+
 def test_a_ring_that_closes_but_for_round_off_is_closed(tmp_path: Path) -> None:
     """61 points whose ends are 1.1e-16 apart: P = 0.5 gives the V of the closed ring, and not of one clamped at a slit."""
     points = circle(2 * np.pi * np.arange(61) / 60)

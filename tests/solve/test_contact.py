@@ -384,3 +384,13 @@ def test_contact_is_told_in_si_units_of_a_scene_with_scales():
     assert not [name for name in fm.inflate(plate(elements=8), volumes=[0.4]).to_dataframe() if name.endswith(("_m", "_n", "_m2"))]
     said = f"a force of {row.contact_force_n * 1e3:.4g} mN" if row.contact_force_n < 1 else f"a force of {row.contact_force_n:.4g} N"
     assert any(said in remark.text for remark in ContactWithBodies().remarks(branch[-1]))
+
+
+def test_an_onset_in_contact_is_refused_for_the_contact():
+    """It is a special point of a branch of its scene, though the mesh there follows the border of contact."""
+    scene = plate(elements=16, analysis=fm.Analysis(azimuthal_modes=(1,)))
+    branch = fm.trace(scene, start=1.8, until={"volume": 2.6})
+    onset = next(p for p in branch.special_points if p.kind == "azimuthal_onset")
+    assert onset.equilibrium.contact.touching
+    with pytest.raises(fm.InputError, match="the states beyond it are not computed: the membrane may touch an obstacle"):
+        fm.trace(branch.scene, start=onset, until={"volume": 2.4})

@@ -394,3 +394,18 @@ def test_an_onset_in_contact_is_refused_for_the_contact():
     assert onset.equilibrium.contact.touching
     with pytest.raises(fm.InputError, match="the states beyond it are not computed: the membrane may touch an obstacle"):
         fm.trace(branch.scene, start=onset, until={"volume": 2.4})
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (fm.Plane(0.5, side="above"), "lies inside it; move it off, or take its other side"),
+        (fm.Ball(0.0, 3.0), "lies inside it; move it off"),
+        (fm.Ball(0.2, 0.3), "cuts the membrane at rest (at r = 0, z = 0, over R0)"),
+    ],
+)
+def test_a_body_on_the_wrong_side_is_not_said_to_cut(body, said):
+    with pytest.raises(fm.InputError) as error:
+        fm.Scene(material=NH, mesh=fm.disc(4), obstacles=[body])
+    assert said in str(error.value)
+    assert str(error.value).endswith("other side") is said.endswith("other side")

@@ -22,6 +22,7 @@ import numpy as np
 
 import femmembrane as fm
 from femmembrane.files import write_csv
+from femmembrane.views import plots
 
 SCENE = fm.Scene(
     material=fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0)),
@@ -48,25 +49,20 @@ def falls(tipped: fm.TippedBranch) -> list[dict[str, float]]:
 
 
 def draw(upright: fm.Branch, tipped: fm.TippedBranch, path: Path) -> None:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), width_ratios=(3, 2))
+    figure, (left, right) = plots.new_figure((11, 4.4), widths=(3.0, 2.0))
     upright.plot(ax=left, label="upright")
     tipped.plot(ax=left, label="leaning")
     left.set(xlim=(0.41, 0.49), ylim=(1.83, 2.04))
+    plots.draw_legend(left, fontsize=8, ncols=2)
     shape = fm.equilibrium(SCENE, center_height=LOWEST).profile(np.linspace(0, 1, 60))
     both = [np.concatenate([-shape["rho"][::-1], shape["rho"]]), np.concatenate([shape["eta"][::-1], shape["eta"]])]
     right.plot(*both, color=UPRIGHT, label="upright")
     cut = tipped[-1].surface(48)
     right.plot(*(np.concatenate([cut[name][::-1, 24], cut[name][:, 0]]) for name in ("x", "z")), color=LEANING, label="leaning")
-    right.set(aspect="equal", xlabel="x", ylabel="z", title=f"in the plane of symmetry at V = {tipped[-1].volume:.4f}")
-    right.legend()
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    title = f"in the plane of symmetry at V = {tipped[-1].volume:.4f}"
+    right.set(aspect="equal", xticks=(-1, -0.5, 0, 0.5, 1), xlabel="x", ylabel="z", title=title)
+    plots.draw_legend(right, loc="upper center", bbox_to_anchor=(0.5, -0.5), ncols=2)
+    plots.save_figure(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -94,16 +94,16 @@ def draw(path: Path, ratios: Sequence[float], count: int) -> None:
     figure, (left, right) = plots.new_figure((10.5, 4.4), widths=(1.0, 1.0))
     for ratio, colour in zip(ratios, COLOURS, strict=False):
         eq = fm.equilibrium(scene(400.0, -3.25, ratio), center_height=-0.3)
-        numbers = sorted({round(n) for n in np.linspace(1, 0.25 * ratio, 30)})
+        numbers = sorted({round(n) for n in np.linspace(1, 0.25 * ratio, count)})
         values = [eq.verdict(azimuthal=n).smallest_eigenvalue / ratio**2 for n in numbers]
-        left.plot(np.array(numbers) / ratio, values, color=colour, label=f"R₀/T = {ratio:g}")
+        left.plot(np.array(numbers) / ratio, values, ".", color=colour, markersize=4, label=f"R₀/T = {ratio:g}")
     left.axhline(0, color="black", linewidth=0.8)
     left.set(xlabel="n T/R₀", ylabel="smallest eigenvalue λ (T/R₀)²", title="M = 400, h = -3.25, pole at -0.3", ylim=(-0.05, 0.02))
     plots.draw_legend(left)
     for ratio, colour in zip(ratios, COLOURS, strict=False):
-        heights = np.linspace(-0.1, -0.5, count)
+        heights = np.linspace(-0.1, -0.5, max(3, count // 6))
         worst = [fm.equilibrium(scene(400.0, -3.25, ratio), center_height=height).verdict(azimuthal="all").azimuthal for height in heights]
-        right.semilogy(heights, worst, "o-", color=colour, markersize=3, label=f"R₀/T = {ratio:g}")
+        right.semilogy(heights, worst, "o", color=colour, markersize=3.5, label=f"R₀/T = {ratio:g}")
     right.set(xlabel="height of the pole", ylabel="worst number of waves", title="M = 400, h = -3.25")
     plots.draw_legend(right)
     plots.save_figure(figure, path)
@@ -132,7 +132,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             found[figure, ratio] = (eq.center_height, eq.pressure, verdict.azimuthal, verdict.wavelength)
             print("{:<14}{:>8g}{:>9.4f}{:>9.4f}{:>6}{:>12.5f}".format(figure, ratio, *found[figure, ratio]))
     write_csv(out / "onsets.csv", ONSETS, ([*key, *values] for key, values in found.items()))
-    draw(out / "wrinkle_numbers.png", ratios, 3 if given.quick else 7)
+    draw(out / "wrinkle_numbers.png", ratios, 12 if given.quick else 90)
 
     by_state = {(row[0], row[3]): row for row in rows}
     assert by_state["7b", 0.4][5:7] == [0.0, 1]

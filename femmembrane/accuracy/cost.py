@@ -39,8 +39,8 @@ TOLERANCES: Mapping[str, tuple[float, ...]] = {
     "published": (1e-3, 1e-5, 1e-7),
 }
 
-#: radii of the profile that collocation sets out from
-_RADII = np.linspace(0, 1, 33)
+#: places of the profile that collocation sets out from, as parts of the meridian
+_SHARES = np.linspace(0, 1, 33)
 #: a state with a relative error above this is another equilibrium, not an inaccurate one
 _ANOTHER = 0.5
 #: shortest turn in seconds, most calls in one, and most times a problem is built
@@ -246,9 +246,11 @@ class Course:
 
     def guess(self) -> Guess:
         """Where the independent methods set out: the two states before the last on a straight line to the load."""
-        known = []
+        first, last = self.potential.space.ends[[0, -1]]
+        places, known = first + (last - first) * _SHARES, []
+        places[-1] = last
         for state in self.states[:2]:
-            profile = profile_at(self.potential.scene, state.x, state.pressure, _RADII).columns(None)
+            profile = profile_at(self.potential.scene, state.x, state.pressure, places).columns(None)
             height = self.potential.space.center_height(state.x)
             known.append(Guess(float(state.pressure), height, float(profile["stretch_1"][0]), profile))
         return known[1].beyond(known[0])
@@ -313,8 +315,8 @@ def _raising(error: SolveError) -> Callable[[str, Potential], State]:
 
 
 def method_jobs(course: Course, methods: Sequence[str], tolerances: Mapping[str, Sequence[float]]) -> list[Job]:
-    """Jobs of the independent methods, all warm; none for a tension field or another meridian than the disc, which they do not solve."""
-    if not methods:  # the guess is for the disc
+    """Jobs of the independent methods, all warm; none for a scene without a strong form, which they do not solve."""
+    if not methods:
         return []
     jobs, guess = [], course.guess()
     for method in methods:

@@ -284,7 +284,8 @@ class Guess:
         profile = None
         if self.profile is not None and before.profile is not None:
             mine, other = self.profile, before.profile
-            profile = {"r": mine["r"], **{n: mine[n] + factor * (mine[n] - other[n]) for n in ("rho", "eta")}}
+            places = {name: mine[name] for name in ("r", "s") if name in mine}
+            profile = {**places, **{n: mine[n] + factor * (mine[n] - other[n]) for n in ("rho", "eta")}}
         return Guess(along("pressure"), along("center_height"), along("stretch"), profile)
 
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .folders import Changes, System, finished, read, units_of
-from .outcome import DONE, say
+from .folders import Changes, OwnScene, System, finished, own_of, read, units_of
+from .outcome import DONE, say, written_in_words
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 
 def explore(
@@ -19,6 +23,7 @@ def explore(
     port: int = 0,
     changes: Changes = None,
     units: System | None = None,
+    own: OwnScene = None,
 ) -> int:
     """Explore a finished run on one HTML page; or, live, a scene whose numbers are moved while its branch is computed.
 
@@ -44,12 +49,12 @@ def explore(
         return serve(read(source, changes), host=host, port=port, units=units_of(source, changes, units))
     if changes:
         raise InputError("--set", changes[0], "allowed with --live only: a finished run has its scene")
-    page = write(source, out, units or "scaled")
-    say(f"written:\n  {page}\n")
+    page = write(source, out, units or "scaled", own_of(own))
+    say(written_in_words("", [page]))
     return DONE
 
 
-def write(folder: Path, out: Path | None = None, units: str = "scaled") -> Path:
+def write(folder: Path, out: Path | None = None, units: str = "scaled", own: Scene | None = None) -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
     from ..files import remove_leftovers
     from ..views.explorer import write_explorer
@@ -57,7 +62,7 @@ def write(folder: Path, out: Path | None = None, units: str = "scaled") -> Path:
     check_explorer()
     inside = folder if folder.is_dir() else folder.parent
     page = inside / "explore.html" if out is None else out
-    branch = finished(folder)
+    branch = finished(folder, own=own)
     remove_leftovers(page.parent)
     write_explorer(branch, page, units=units)
     return page

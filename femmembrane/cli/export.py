@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
-from .folders import finished
-from .outcome import DONE, say
+from .folders import OwnScene, finished, own_of
+from .outcome import DONE, say, written_in_words
 
 
-def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | None = None) -> int:
+def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | None = None, own: OwnScene = None) -> int:
     """Write a finished run for other programs: pvd, xdmf (all equilibria), vtu, stl, obj (one), or csv (meridians).
 
     Exit codes: 0 done, 2 bad input.
@@ -33,6 +33,6 @@ def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | Non
     if out is not None and out.suffix.lower() != suffix:
         raise InputError("--out", str(out), f"a name that ends in {suffix} is allowed")
     file = out or (folder if folder.is_dir() else folder.parent) / f"export{suffix}"
-    files = write(finished(folder), file, step=step)
-    say(f"written:\n  {files[-1]}\n")
+    files = write(finished(folder, own=own_of(own)), file, step=step)
+    say(written_in_words("", [files[-1]]))
     return DONE

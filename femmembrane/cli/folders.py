@@ -29,6 +29,13 @@ Changes = Annotated[
 ]
 
 
+#: of a finished run with parts of one's own
+OwnScene = Annotated[
+    Path | None,
+    Parameter(name="--scene", help="Scene file of the run, needed for materials, sources or shapes of your own: they are imported."),
+]
+
+
 def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = True) -> Scene:
     """The scene of a file, or a scene that comes with the package, by its name. Values of ``--set`` go before the values of the file."""
     from ..memory import require_libraries
@@ -37,7 +44,7 @@ def read(path: Path, changes: Sequence[str] | None = None, *, needs_run: bool = 
     from ..scene import Scene
 
     tables, folder = tables_of(path, changes)
-    scene = Scene.from_dict(tables, folder)
+    scene = Scene.from_dict(tables, folder, own=True)
     if needs_run and scene.run is None:
         raise InputError("run", None, 'missing; say what to compute: [run] with control = "volume", start, stop and steps')
     return scene
@@ -55,6 +62,11 @@ def tables_of(path: Path, changes: Sequence[str] | None = None) -> tuple[dict[st
 
         tables = set_all("--set", tables, changes)
     return tables, path.parent
+
+
+def own_of(scene: Path | None) -> Scene | None:
+    """The scene that has the parts of one's own which a finished run lacks."""
+    return None if scene is None else read(scene, needs_run=False)
 
 
 def units_of(path: Path, changes: Sequence[str] | None, asked: str | None) -> str:
@@ -127,7 +139,7 @@ def _remove_empty(folders: Iterable[Path]) -> None:
             folder.rmdir()
 
 
-def finished(folder: Path, facts: Mapping[str, Any] | None = None) -> Branch:
+def finished(folder: Path, facts: Mapping[str, Any] | None = None, own: Scene | None = None) -> Branch:
     """The branch that a run left in a folder, or that was saved to a file.
 
     Parameters
@@ -151,7 +163,7 @@ def finished(folder: Path, facts: Mapping[str, Any] | None = None) -> Branch:
     file = folder / "branch.nc" if folder.is_dir() else folder
     if not file.is_file():
         raise InputError("folder", str(folder), "the folder of a run (with its branch.nc) or a saved branch (.nc) is allowed")
-    branch = load(file)
+    branch = load(file, scene=own)
     if facts:
         refuse_other_branch(branch, facts, folder)
     return branch

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -32,6 +33,13 @@ def fail(code: int, message: str) -> int:
 def say(text: str) -> None:
     """Write to standard output."""
     _write(sys.stdout, text)
+
+
+def written_in_words(head: str, written: Sequence[Path]) -> str:
+    """What was computed and written: a line for each file on a terminal, one line in a pipe."""
+    if sys.stdout.isatty():
+        return "\n".join([f"{head}written:", *(f"  {path}" for path in written)]) + "\n"
+    return " ".join([f"{head}written:", *map(str, written)]) + "\n"
 
 
 def _write(stream: TextIO, text: str) -> None:

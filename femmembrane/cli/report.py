@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Status
-from .folders import System, finished
-from .outcome import DONE, say
+from .folders import OwnScene, System, finished, own_of
+from .outcome import DONE, say, written_in_words
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
+    from ..scene import Scene
 
 
-def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled") -> int:
+def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled", own: OwnScene = None) -> int:
     """Write one HTML page about a finished run: figures, verdicts, special points, zones, error estimates, scene, timings, versions.
 
     The page needs no network, and has what the run has. Exit codes: 0 done, 2 bad input.
@@ -27,12 +28,12 @@ def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled"
     units
         Of figures and ranges: those of the package, or SI units by the [scales] of the scene.
     """
-    page = write(folder, out, units)
-    say(f"written:\n  {page}\n")
+    page = write(folder, out, units, own_of(own))
+    say(written_in_words("", [page]))
     return DONE
 
 
-def write(folder: Path, out: Path | None = None, units: str = "scaled") -> Path:
+def write(folder: Path, out: Path | None = None, units: str = "scaled", own: Scene | None = None) -> Path:
     """Write the page of a run's folder, or of a saved branch, and return its path."""
     from ..files import remove_leftovers
     from ..results.output import read_record
@@ -41,19 +42,25 @@ def write(folder: Path, out: Path | None = None, units: str = "scaled") -> Path:
     inside = folder if folder.is_dir() else folder.parent
     facts = (read_record(folder) or {}) if folder.is_dir() else {}
     alone = facts.get("equilibria") == 0 and not (folder / "branch.nc").exists()
-    branch = _without_equilibria(facts) if alone else finished(folder, facts)
+    branch = _without_equilibria(facts, own) if alone else finished(folder, facts, own)
     page = inside / "report.html" if out is None else out
     remove_leftovers(page.parent)
     write_report(branch, page, facts, units=units)
     return page
 
 
-def _without_equilibria(facts: dict[str, Any]) -> Branch:
+def _without_equilibria(facts: dict[str, Any], own: Scene | None) -> Branch:
     """The branch of a run that found nothing and so left no other file."""
     from ..results.branch import Branch
     from ..scene import Scene
 
     try:
-        return Branch(Scene.from_dict(facts["scene"]), (), Status(facts["status"]), facts["message"], facts["timings"])
+        return Branch(
+            Scene.from_dict(facts["scene"], own=False if own is None else own),
+            (),
+            Status(facts["status"]),
+            facts["message"],
+            facts["timings"],
+        )
     except (KeyError, ValueError, RecursionError) as error:
         raise InputError("folder", "run.json", f"the run.json of a run is needed ({error})") from None

@@ -13,7 +13,20 @@ from .explore import check_explorer
 from .explore import write as write_explorer
 from .folders import Changes, System, finished, read, units_of, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, count, explain, fail, not_written, refused, say
+from .outcome import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    NOT_CONVERGED,
+    NOT_WRITTEN,
+    count,
+    explain,
+    fail,
+    not_written,
+    refused,
+    say,
+    written_in_words,
+)
 from .progress import observer
 from .report import write as write_report
 
@@ -72,7 +85,7 @@ def run(
         fail(DONE, remark)
 
     with working(out, (*run_files(), NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
-        kept = unfinished(out) if resume else None
+        kept = unfinished(out, asked) if resume else None
         if kept is not None:
             same_scene(asked, kept, "--resume")
         elif resume and (ended := _ended(asked, out)) is not None:
@@ -90,9 +103,9 @@ def run(
                 checkpoints.save()
             written = _write(branch, out, scene, changes or (), system)
             if report:
-                written.append(write_report(out, units=system))
+                written.append(write_report(out, units=system, own=asked))
             if explore and len(branch):
-                written.append(write_explorer(out, units=system))
+                written.append(write_explorer(out, units=system, own=asked))
         except KeyboardInterrupt:  # the second one
             checkpoints.save()
             return fail(INTERRUPTED, f"interrupted while results were written to {out}: some are missing; --resume writes them")
@@ -105,7 +118,7 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    say(_summary(branch, written))
+    say(written_in_words(f"{count(len(branch))}, ", written))
     return DONE
 
 
@@ -121,7 +134,7 @@ def _ended(scene: Scene, out: Path) -> int | None:
     if facts["status"] == Status.INTERRUPTED:
         return None
     if facts["equilibria"]:
-        finished(out, facts)  # results that are damaged, or of another run, are refused here, and not reported as done
+        finished(out, facts, scene)  # results that are damaged, or of another run, are refused here, and not reported as done
     message = f"nothing to resume: the run in {out} has ended, with {count(facts['equilibria'])}"
     if facts["status"] == Status.CONVERGED:
         return fail(DONE, message)
@@ -186,8 +199,3 @@ def _kept(error: Exception, checkpoints: Checkpoints, out: Path) -> str:
     if not refused(error):
         return f"{not_written(error, out)}" + (f"; {kept}" if saved else "")
     return f"{not_written(error, out)}; " + (f"{kept}: make room, and --resume writes the rest" if saved else "make room")
-
-
-def _summary(branch: Branch, written: Sequence[Path]) -> str:
-    lines = [f"{count(len(branch))}, written:", *(f"  {path}" for path in written)]
-    return "\n".join(lines) + "\n"

@@ -43,7 +43,7 @@ degree = 2
 
 # [effects]
 # tension_field = true                 # wrinkles in place of compression
-# bending = true                       # verdicts with bending stiffness: how many wrinkles; needs membrane.radius_to_thickness
+# or bending = true                    # verdicts with bending stiffness: how many wrinkles; needs membrane.radius_to_thickness
 
 [run]
 control = "volume"                     # or "pressure", "height"; "arc-length" takes start (a volume) and until

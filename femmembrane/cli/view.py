@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import SolveError
-from .folders import System, finished
+from .folders import OwnScene, System, finished, own_of
 from .outcome import DONE, NOT_CONVERGED, explain, fail
 
 
@@ -19,6 +19,7 @@ def view(
     screenshot: Path | None = None,
     movie: Path | None = None,
     units: System = "scaled",
+    own: OwnScene = None,
 ) -> int:
     """Show the membrane of a run in space: a window with a slider over the steps, or a picture or movie, which need no display.
 
@@ -46,9 +47,10 @@ def view(
 
     for file in filter(None, (screenshot, movie)):
         remove_leftovers(file.parent)
+    branch = finished(folder, own=own_of(own))
     try:
         with counter("frames") as count:
-            show(finished(folder), color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units, on_frame=count)
+            show(branch, color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units, on_frame=count)
     except SolveError as error:
         return fail(NOT_CONVERGED, explain(error.status, str(error)))
     return DONE

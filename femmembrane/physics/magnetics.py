@@ -109,6 +109,16 @@ class Source:
         """
         return any(distance_to_polyline(rho, eta, circle) < 1e-9 for circle in self.circles)
 
+    def inside(self, rho: Array, eta: Array) -> NDArray[np.bool_]:
+        """Which points are in a body that the membrane is free to enter in a computation, and not in a laboratory.
+
+        Parameters
+        ----------
+        rho, eta : ndarray
+            Radii and heights of points, over R0.
+        """
+        return np.zeros(np.shape(rho), dtype=bool)
+
     def passed(self, before: float, after: float) -> bool:
         """Whether a point on the axis that moved between two heights went through the source.
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import store, whole
-from .magnetics import Source, check_source, root
+from .magnetics import Array, Source, check_source, root
 from .outline import Outline
 
 #: steps of the arithmetic-geometric mean: round-off at distances from the wire down to 1e-6 of its radius
@@ -129,6 +130,10 @@ class Solenoid(Source):
         """Squared distance from the wall, where the field jumps."""
         beyond = np.maximum(np.abs(eta - self.height) - self.length / 2, 0.0)
         return (rho - self.radius) ** 2 + beyond**2
+
+    def inside(self, rho: Array, eta: Array) -> NDArray[np.bool_]:
+        """See :meth:`.Source.inside`: within its wall, where a solenoid that is wound on a core has no room."""
+        return (rho <= self.radius) & (np.abs(eta - self.height) <= self.length / 2)
 
     def outline(self) -> Outline:
         """The wall, with an arrow along the moment."""

@@ -85,8 +85,10 @@ class Checkpoints:
         self.path.unlink(missing_ok=True)
 
 
-def unfinished(folder: Path) -> Branch | None:
+def unfinished(folder: Path, own: Scene | None = None) -> Branch | None:
     """The branch from which the run in a folder can go on, or None. If it was begun elsewhere, a remark says where.
+
+    Parts that are no part of the package are those of a scene that is given.
 
     Raises
     ------
@@ -98,7 +100,7 @@ def unfinished(folder: Path) -> Branch | None:
         if not path.exists():
             return None
         dataset = read_branch_file(path)
-        branch = branch_of(dataset, path)
+        branch = branch_of(dataset, path, own)
         began = json.loads(str(dataset.attrs.get("origin", "{}")))
         remark = difference(began if isinstance(began, dict) else {}, origin())
         return replace(branch, remarks=tuple(dict.fromkeys((*branch.remarks, *([remark] if remark else [])))))
@@ -115,7 +117,7 @@ def same_scene(asked: Scene, kept: Branch, key: str) -> Scene:
     InputError
         When it is not the scene asked for, naming all that differs.
     """
-    refuse_others(asked, kept.scene.to_dict(), key)
+    refuse_others(asked, kept.scene.record(), key)
     return kept.scene
 
 
@@ -127,7 +129,7 @@ def refuse_others(asked: Scene, kept: Mapping[str, Any], key: str) -> None:
     InputError
         Naming all that differs.
     """
-    here, there = (dict(_flat(tables)) for tables in (asked.to_dict(), kept))
+    here, there = (dict(_flat(tables)) for tables in (asked.record(), kept))
     if asked.open and here.get("mesh.accuracy") == there.get("mesh.accuracy"):  # the mesh that was chosen for it
         here, there = ({k: v for k, v in keys.items() if not k.startswith("mesh.")} for keys in (here, there))
     words = _difference(here, there)

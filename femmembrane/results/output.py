@@ -51,7 +51,8 @@ def write_run(
     ``branch.nc``, ``branch.csv``, ``special_points.csv`` (when the branch was searched for them), the files of the analyses that the scene
     asks for (of wrinkling ``zones.csv`` and ``zones.png``), ``pressure-volume.png`` (over a number
     ``response.png``), ``membrane.pvd`` with one VTU file an equilibrium in
-    ``membrane/`` and, last, ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without
+    ``membrane/`` (not with ``vtu=False`` in the scene)
+    and, last, ``run.json``: a folder with this file is complete. Every file is written whole or not at all. A branch without
     equilibria leaves ``run.json`` and tables without rows. Files of an earlier run in the same folder that this run does not write are
     removed, so that the folder speaks of one run only.
 
@@ -134,7 +135,7 @@ def refuse_other_branch(branch: Branch, facts: Mapping[str, Any], folder: Path) 
     InputError
         Naming all that differs in the scene; where the scene is the same, that it is another run of it.
     """
-    differing = scene_difference(branch.scene.to_dict(), facts["scene"])
+    differing = scene_difference(branch.scene.record(), facts["scene"])
     # wall times are those of one run alone
     own = {"status": branch.status.value, "message": branch.message, "equilibria": len(branch), "timings": dict(branch.timings)}
     if not differing and all(facts.get(name, value) == value for name, value in own.items()):
@@ -192,7 +193,8 @@ def _writers(branch: Branch, command: str | Sequence[str] | None, units: str) ->
     if len(branch):
         diagram = DIAGRAMS[bool(branch.over)]
         writers |= {"branch.nc": partial(save, branch), diagram: partial(door.plot_pressure_volume, branch, units=units)}
-        writers[SURFACES] = partial(door.write_vtk, branch)
+        if branch.scene.vtu:
+            writers[SURFACES] = partial(door.write_vtk, branch)
         writers |= {name: partial(draw, branch) for analysis in analyses for name, draw in analysis.pictures.items()}
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
     return writers
@@ -221,7 +223,7 @@ def _writable(folder: Path) -> Path:
 def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any]:
     """The record of a run: what was asked, on which machine, and how it ended."""
     return {
-        "scene": branch.scene.to_dict(),
+        "scene": branch.scene.record(),
         "command": command if command is None or isinstance(command, str) else list(command),
         **({"mesh": branch.mesh_used} if branch.mesh_used else {}),
         **({"notes": list(branch.notes)} if branch.notes else {}),

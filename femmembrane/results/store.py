@@ -20,6 +20,7 @@ from ..discretization.meridian import side
 from ..errors import InputError, Status
 from ..origin import package_version
 from ..scene import Scene
+from ..scene.own import MissingPartError
 from .analyses import asked, known_quantity, typed_column
 from .analyses.base import Variable
 from .branch import Branch
@@ -79,13 +80,15 @@ def save(branch: Branch, path: str | PathLike[str], facts: Mapping[str, str] | N
     write_dataset(dataset, path, encoding)
 
 
-def load(path: str | PathLike[str]) -> Branch:
+def load(path: str | PathLike[str], *, scene: Scene | None = None) -> Branch:
     """Bring a saved branch back, without solving anything.
 
     Parameters
     ----------
     path : path
         A file that :meth:`Branch.save` or a run wrote, or the folder of a run.
+    scene : Scene, optional
+        For a scene with materials, sources, shapes or functions of your own: where these come from. A data file imports nothing.
 
     Returns
     -------
@@ -113,10 +116,10 @@ def load(path: str | PathLike[str]) -> Branch:
         path = join(path, "branch.nc")
         if not exists(path):
             raise InputError("path", str(path), "there is no branch.nc in this folder: the folder of a run is allowed")
-    return branch_of(read_branch_file(path), path)
+    return branch_of(read_branch_file(path), path, scene)
 
 
-def branch_of(dataset: xarray.Dataset, path: str | PathLike[str]) -> Branch:
+def branch_of(dataset: xarray.Dataset, path: str | PathLike[str], own: Scene | None = None) -> Branch:
     """The branch of the data set that :func:`read_branch_file` read.
 
     Raises
@@ -125,8 +128,10 @@ def branch_of(dataset: xarray.Dataset, path: str | PathLike[str]) -> Branch:
         When it is none of ours, or not complete.
     """
     try:
-        scene = scene_from_text(dataset.attrs["scene"])
+        scene = scene_from_text(dataset.attrs["scene"], own)
         branch = _branch(dataset, scene)
+    except MissingPartError:
+        raise
     except Exception as error:  # there is nothing that a file nobody wrote in this way could not lead to
         raise InputError("path", str(path), f"a complete file written by femmembrane is needed ({reason(error)})") from error
     if not scene.open and _INSIDE[0] not in dataset.attrs and side(scene.mesh) < 0:
@@ -139,12 +144,12 @@ def scene_text(scene: Scene) -> str:
     """The scene as the text of a TOML file."""
     import tomli_w
 
-    return tomli_w.dumps(scene.to_dict())
+    return tomli_w.dumps(scene.record())
 
 
-def scene_from_text(text: str) -> Scene:
-    """The scene of a TOML text."""
-    return Scene.from_dict(tomllib.loads(text))
+def scene_from_text(text: str, own: Scene | None = None) -> Scene:
+    """The scene of a TOML text; parts that are no part of the package are those of a scene that is given."""
+    return Scene.from_dict(tomllib.loads(text), own=False if own is None else own)
 
 
 def _table_variables(branch: Branch) -> dict[str, Variable]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..scene.own import MissingPartError
 from . import door
 from .grid import load_dataset, save_dataset
 from .store import scene_from_text
@@ -79,12 +80,14 @@ class Sweep:
         save_dataset(self._dataset, path)
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> Sweep:
+    def load(cls, path: str | PathLike[str], *, scene: Scene | None = None) -> Sweep:
         """Bring a saved sweep back.
 
         Parameters
         ----------
         path : path
+        scene : Scene, optional
+            For a scene with materials, sources, shapes or functions of your own: where these come from. A data file imports nothing.
 
         Raises
         ------
@@ -94,10 +97,12 @@ class Sweep:
         dataset = load_dataset(path)
         over = {key: tuple(dataset[key].values.tolist()) for key in json.loads(dataset.attrs["over"])}
         try:
-            scene = scene_from_text(dataset.attrs["scene"])
+            asked = scene_from_text(dataset.attrs["scene"], scene)
+        except MissingPartError:
+            raise
         except (ValueError, RecursionError) as error:
             raise InputError("path", str(path), f"a sweep written by femmembrane is needed ({error})") from None
-        return cls(scene, over, dataset.attrs["quantity"], dataset)
+        return cls(asked, over, dataset.attrs["quantity"], dataset)
 
     @property
     def scales(self) -> Scales | None:

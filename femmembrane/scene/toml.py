@@ -14,11 +14,13 @@ A scene file has one table for each part; the keys of a table are the arguments 
                 file, ...        or a mesh file and what else FILE_KEYS lists; the scene keeps its points
     [electric]                   Electric
     [effects]                    attributes of Scene that are on or off
+    [output]                     vtu: whether a run writes surfaces
     [run]                        Run
     [analysis]                   Analysis
     [scales]                     Scales
     [chamber]                    Chamber
 
+A model, kind or shape with a colon is a part of one's own, :mod:`.own`.
 A new model, source, load or shape is a line in its registry; a new key of a table is a line in SCENE_KEYS or a field of its class.
 Values are checked where the objects are made, so that files and Python code meet the same errors, named by their key in a file.
 """
@@ -58,6 +60,7 @@ from ..physics.scales import Scales
 from ..physics.sources import Loop, Solenoid, Uniform, Wire
 from ..physics.tabulated import Tabulated
 from .analysis import Analysis
+from .own import Parts, described, function_name, is_own
 from .run import Run
 
 if TYPE_CHECKING:
@@ -108,7 +111,10 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
     ),
     "mesh": ("degree", "follow_zones"),
     "effects": ("tension_field", "demagnetization", "bending"),
+    "output": ("vtu",),
 }
+#: attributes of Scene that may be functions along the meridian
+_ALONG = ("thickness", "modulus", "remanence")
 #: arguments of Electric whose keys are words that Python keeps for itself, or stand beside one
 ELECTRIC_KEYS = {"start": "from", "stop": "to"}
 #: largest size of a scene file, enough for a million elements by their radii; a stream without end is refused
@@ -163,7 +169,7 @@ def _line(text: str, reason: str) -> str:
     return f": {shown}" if shown else ""
 
 
-def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def scene_arguments(data: Mapping[str, Any], folder: Path, own: Parts) -> dict[str, Any]:
     """The arguments of :class:`.Scene` from the tables of a scene file.
 
     Parameters
@@ -171,6 +177,8 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     data : mapping
     folder : Path
         Where the path of a mesh file starts from.
+    own : Parts
+        Where parts of one's own come from.
 
     Raises
     ------
@@ -184,13 +192,16 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     arguments = {name: tables[table][name] for table, names in SCENE_KEYS.items() for name in names if name in tables[table]}
     for table in SCENE_KEYS.keys() - {"mesh"}:
         _refuse_unknown(table, tables[table], SCENE_KEYS[table])
+    for name in _ALONG:
+        if str(arguments.get(name, "")).startswith(":"):
+            arguments[name] = own.factor(f"membrane.{name}", arguments[name])
     scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
     return dict(
-        material=material_of(tables["material"]),
-        sources=_build_list("source", SOURCES, data.get("source", ()), scales),
-        loads=_build_list("load", LOADS, data.get("load", ())),
-        obstacles=_build_list("obstacle", OBSTACLES, _with_points(data.get("obstacle", ()), folder)),
-        mesh=_build_mesh(tables["mesh"], folder),
+        material=material_of(tables["material"], own),
+        sources=_build_list("source", SOURCES, data.get("source", ()), own, scales),
+        loads=_build_list("load", LOADS, data.get("load", ()), own),
+        obstacles=_build_list("obstacle", OBSTACLES, _with_points(data.get("obstacle", ()), folder), own),
+        mesh=_build_mesh(tables["mesh"], folder, own),
         run=_build("run", Run, tables["run"]) if "run" in data else None,
         analysis=_build("analysis", Analysis, tables["analysis"]),
         title=data.get("title", ""),
@@ -201,23 +212,23 @@ def scene_arguments(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     )
 
 
-def tables_of(scene: Scene) -> dict[str, Any]:
-    """A scene as the tables of a scene file, with plain values only.
+def tables_of(scene: Scene, record: bool = False) -> dict[str, Any]:
+    """A scene as the tables of a scene file, with plain values only; for a record with parts that have no form in such files as well.
 
     Raises
     ------
     InputError
-        When a material, source, load or mesh has no name in scene files.
+        When a part has no form in scene files, and the tables are not for a record.
     """
     tables: dict[str, Any] = {
         "title": scene.title,
-        "material": _describe_material(scene.material),
+        "material": _describe_material(scene.material, record),
         **{table: {name: getattr(scene, name) for name in names} for table, names in SCENE_KEYS.items() if table != "mesh"},
-        "source": [_describe("source", "kind", SOURCES, source) for source in scene.sources],
-        "load": [_describe("load", "kind", LOADS, load) for load in scene.loads],
-        "obstacle": [_describe("obstacle", "kind", OBSTACLES, body) for body in scene.obstacles],
+        "source": [_describe("source", "kind", SOURCES, source, record) for source in scene.sources],
+        "load": [_describe("load", "kind", LOADS, load, record) for load in scene.loads],
+        "obstacle": [_describe("obstacle", "kind", OBSTACLES, body, record) for body in scene.obstacles],
         "mesh": {
-            **_describe("mesh", "shape", SHAPES, scene.mesh),
+            **_describe("mesh", "shape", SHAPES, scene.mesh, record),
             "degree": scene.degree,
             **({"follow_zones": True} if scene.follow_zones else {}),
         },
@@ -227,12 +238,17 @@ def tables_of(scene: Scene) -> dict[str, Any]:
         "chamber": _arguments(scene.chamber) if scene.chamber else {},
         "electric": {} if scene.electric is None else {ELECTRIC_KEYS.get(k, k): v for k, v in _arguments(scene.electric).items()},
     }
-    for name in ("thickness", "modulus", "remanence"):
-        if callable(getattr(getattr(scene, name), "given", None)):
+    for name in _ALONG:
+        given = getattr(getattr(scene, name), "given", None)
+        if callable(given) and record:
+            tables["membrane"][name] = function_name(given)
+        elif callable(given):
             raise InputError(
                 f"membrane.{name}", getattr(scene, name).given, "a function has no name in scene files; an expression or a table has"
             )
     tables["effects"] = {name: True for name, on in tables["effects"].items() if on}
+    if scene.vtu:  # as in files that are older than the key
+        del tables["output"]
     if scene.prestretch == 1:
         del tables["membrane"]["prestretch"]
     if scene.scales:  # which hold it already
@@ -290,31 +306,35 @@ def _build(path: str, cls: Any, table: Mapping[str, Any], beside: tuple[str, ...
     return cls(**{name: table[name] for name in names if name in table})
 
 
-def _build_one_of(path: str, selector: str, registry: Mapping[str, Any], table: Mapping[str, Any], beside: tuple[str, ...] = ()) -> Any:
+def _build_one_of(
+    path: str, selector: str, registry: Mapping[str, Any], table: Mapping[str, Any], own: Parts | None, beside: tuple[str, ...] = ()
+) -> Any:
     """The object of the class that a table names by its key ``selector``."""
     if selector not in table:
         raise InputError(f"{path}.{selector}", None, "missing; known: " + ", ".join(sorted(registry)))
+    if own is not None and is_own(table[selector]):
+        return own.part(path, selector, {name: value for name, value in table.items() if name not in beside})
     choice(f"{path}.{selector}", table[selector], registry)
     return _build(path, registry[table[selector]], table, (selector, *beside))
 
 
-def material_of(table: Mapping[str, Any]) -> Any:
+def material_of(table: Mapping[str, Any], own: Parts | None = None) -> Any:
     """The material that a table [material] describes."""
     if "name" not in table:
-        return _build_one_of("material", "model", MATERIALS, table)
+        return _build_one_of("material", "model", MATERIALS, table, own)
     for key in table.keys() - {"name"}:
         raise InputError(f"material.{key}", table[key], "not allowed beside material.name, which says all of the material; leave one out")
     return material(table["name"])
 
 
-def _describe_material(value: Any) -> dict[str, Any]:
+def _describe_material(value: Any, record: bool) -> dict[str, Any]:
     name = getattr(value, "named", None)
-    return _describe("material", "model", MATERIALS, value) if name is None else {"name": name}
+    return _describe("material", "model", MATERIALS, value, record) if name is None else {"name": name}
 
 
-def _build_mesh(table: Mapping[str, Any], folder: Path) -> Meridian:
+def _build_mesh(table: Mapping[str, Any], folder: Path, own: Parts) -> Meridian:
     if "file" not in table:
-        mesh: Meridian = _build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, beside=SCENE_KEYS["mesh"])
+        mesh: Meridian = _build_one_of("mesh", "shape", SHAPES, {"shape": "disc", **table}, own, beside=SCENE_KEYS["mesh"])
         return mesh
     _refuse_unknown("mesh", table, ("file", "unit", *FILE_KEYS, *SCENE_KEYS["mesh"]))
     if not isinstance(table["file"], str):
@@ -330,7 +350,7 @@ def _unit_of_file(path: str, table: Mapping[str, Any]) -> float:
     return number(f"{path}.unit", table.get("unit", 1), allowed, above=0)
 
 
-def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Scales | None = None) -> tuple[Any, ...]:
+def _build_list(name: str, registry: Mapping[str, Any], tables: Any, own: Parts, scales: Scales | None = None) -> tuple[Any, ...]:
     if isinstance(tables, Mapping):
         raise InputError(name, tables, f"a list of tables is allowed: write [[{name}]], one for each {name}")
     tables = sequence(name, tables, f"a list of tables is allowed: [[{name}]], one for each {name}")
@@ -344,7 +364,7 @@ def _build_list(name: str, registry: Mapping[str, Any], tables: Any, scales: Sca
         try:
             if table.get("kind") == "magnet" and "remanence" in table:
                 table = _with_strength(table, scales)
-            items.append(_build_one_of(path, "kind", registry, table))
+            items.append(_build_one_of(path, "kind", registry, table, own))
         except InputError as error:  # it does not know its place in the list
             raise InputError(re.sub(rf"^{name}(?=\.)", path, error.key), error.value, error.allowed) from None
     return tuple(items)
@@ -383,11 +403,15 @@ def item_path(name: str, index: int, count: int) -> str:
     return name if count == 1 else f"{name}[{index}]"
 
 
-def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any) -> dict[str, Any]:
+def _describe(path: str, selector: str, registry: Mapping[str, Any], value: Any, record: bool) -> dict[str, Any]:
     for name, cls in registry.items():
         if type(value) is cls:
             return {selector: name, **_arguments(value)}
-    raise InputError(f"{path}.{selector}", value, "it has no name in scene files; known: " + ", ".join(sorted(registry)))
+    found = described(selector, value)
+    if not (record or found[selector].partition(":")[0]):
+        advice = "known, beside module:Class of a module of your own: " + ", ".join(sorted(registry))
+        raise InputError(f"{path}.{selector}", value, f"it has no name in scene files; {advice}")
+    return found
 
 
 def _arguments(value: Any) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from ..physics.scales import AGREEMENT, Scales
 from .analysis import Analysis
 from .bodies import check_obstacles
 from .magnetisation import checked_magnetisation, refuse_magnetisation
+from .own import parts_from
 from .run import GAS, Run
 from .toml import item_path, read_tables, scene_arguments, tables_of
 from .variation import names
@@ -111,6 +112,8 @@ class Scene:
         scales, and elements of degree 2 or higher.
     obstacles : sequence of Obstacle
         Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
+    vtu : bool
+        Whether a run writes surfaces for ParaView to its folder, most of what is in it. They change no number.
     borders : tuple of (int, float)
         Found with an equilibrium in contact, and not to be given: ends of elements that stand at the borders of contact, by their numbers,
         with their places along the meridian.
@@ -161,6 +164,7 @@ class Scene:
     #: whether R0/T was given, by itself or by scales
     _thickness_given: ClassVar[bool] = False
     obstacles: tuple[Obstacle, ...] = ()
+    vtu: bool = field(default=True, repr=False)
     borders: tuple[tuple[int, float], ...] = field(default=(), repr=False, metadata={"found": True})
 
     def __post_init__(self) -> None:
@@ -195,6 +199,7 @@ class Scene:
         store(
             self,
             bending=bending,
+            vtu=switch("output.vtu", self.vtu),
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,
             loads=loads,
@@ -422,8 +427,12 @@ class Scene:
         """
         return tables_of(self)
 
+    def record(self) -> dict[str, Any]:
+        """The tables of :meth:`to_dict` for the record of a run; a part without a form in scene files has its class and a note there."""
+        return tables_of(self, record=True)
+
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], folder: str | PathLike[str] = ".") -> Self:
+    def from_dict(cls, data: Mapping[str, Any], folder: str | PathLike[str] = ".", own: bool | Scene = False) -> Self:
         """The scene that the tables of a scene file describe.
 
         Parameters
@@ -432,6 +441,9 @@ class Scene:
             Tables, as :meth:`to_dict` gives them.
         folder : path
             Where the path of a mesh file starts from.
+        own : bool or Scene
+            Where parts named ``module:Class`` come from: modules that are imported (True, for tables that you trust as you trust a
+            program), nowhere (False: they are refused), or a scene that has them.
 
         Raises
         ------
@@ -442,11 +454,11 @@ class Scene:
         from .laboratory import scaled
 
         with shown_as_given(data):
-            return cls(**scene_arguments(scaled(data), Path(folder)))
+            return cls(**scene_arguments(scaled(data), Path(folder), parts_from(own, Path(folder))))
 
     @classmethod
     def from_toml(cls, path: str | PathLike[str]) -> Self:
-        """Read a scene file.
+        """Read a scene file. A part named ``module:Class`` in it is imported, from the folder of the file or the path of Python.
 
         Parameters
         ----------
@@ -457,7 +469,7 @@ class Scene:
         InputError
             When the file cannot be read, is no TOML (with the line), or does not describe a scene.
         """
-        return cls.from_dict(read_tables(path), Path(path).parent)
+        return cls.from_dict(read_tables(path), Path(path).parent, own=True)
 
     def to_toml(self, path: str | PathLike[str]) -> None:
         """Write a scene file that :meth:`from_toml` reads back to an equal scene.

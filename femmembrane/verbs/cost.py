@@ -18,6 +18,7 @@ from ..accuracy import cost as work
 from ..accuracy.cost import Course, Job, Outcome
 from ..accuracy.strong_form import StrongForm, prescribed
 from ..checks import is_number, is_whole
+from ..discretization.meridian import Disc
 from ..errors import InputError, SolveError, unknown_name
 from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version, processor
@@ -91,7 +92,7 @@ def cost(
     solvers : sequence of {"newton", "ipopt"}
     starts : sequence of {"warm", "cold"}
     methods : sequence of {"shooting", "collocation", "published"}, optional
-        Default: all of them, or none for a tension field or another shape than the disc, which they do not solve.
+        Default: all that solve the scene: the published one is for the disc, and none is for a tension field or a shape with kinks.
     tolerances : mapping of str to sequence of float
         Tolerances at which each method is measured.
     repeat : int
@@ -133,7 +134,7 @@ def cost(
         if not (is_number(value) and value >= least):
             raise InputError(key, value, f"a finite number {'>' if key == 'step' else '>='} 0 is allowed")
     if methods is None:
-        methods = tuple(work.METHODS) if _has_strong_form(scene) else ()
+        methods = tuple(m for m in work.METHODS if m != "published" or isinstance(scene.mesh, Disc)) if _has_strong_form(scene) else ()
     elif methods:
         StrongForm(scene)  # says why not
     _known("tolerances", [m for m in methods if m not in tolerances], ())

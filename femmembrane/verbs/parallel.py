@@ -7,14 +7,16 @@ on its own, so that its row does not depend on the process or the time.
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.process import BaseProcess
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +37,15 @@ WORKER_BYTES = 100 * 2**20
 def cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def sendable(scene: Scene) -> bool:
+    """Whether other processes can get a scene: not with a function that no module holds."""
+    try:
+        pickle.dumps(scene)
+    except Exception:  # whatever an object of somebody's own raises
+        return False
+    return True
 
 
 def here(tasks: Iterator[Task]) -> Iterator[tuple[str, Row]]:
@@ -107,9 +118,25 @@ def _processes(workers: int) -> Iterator[Executor]:
     executor.shutdown()
 
 
+def _submit(executor: Executor, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    """Hand a task to an executor, which may start a process for it. Ctrl-C waits meanwhile: the process is born with it blocked, so that it
+    does not complain about an interrupt before :func:`_begin`.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        return executor.submit(function, *arguments)
+    resource_tracker.ensure_running()  # to start it later would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return executor.submit(function, *arguments)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin() -> None:
     """Set up a new process: Ctrl-C ends it without a word, and it ends with its parent, even if the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     parent = parent_process()
     if parent is not None:
         threading.Thread(target=_follow, args=(parent,), daemon=True).start()
@@ -123,7 +150,7 @@ def _follow(parent: BaseProcess) -> None:
 def _try_out(executor: Executor, workers: int) -> None:
     """Make one trivial call, so that processes that cannot start are not taken for a fault of the scenes."""
     try:
-        executor.submit(os.getpid).result(_PATIENCE)
+        _submit(executor, os.getpid).result(_PATIENCE)
     except BrokenProcessPool:
         advice = 'a script must call this below if __name__ == "__main__":, for each process reads it; or give workers=1'
         raise InputError("workers", workers, f"no process could be started; {advice}") from None
@@ -148,7 +175,7 @@ def _drive(executor: Executor, tasks: Iterator[Task], under_way: dict[str, Task]
     for task in tasks:
         key, scene, quantity, options = task
         under_way[key] = task
-        futures[executor.submit(compute, scene, quantity, options)] = key
+        futures[_submit(executor, compute, scene, quantity, options)] = key
         if len(futures) >= room():
             yield from _finished(futures, under_way)
     while futures:
@@ -175,7 +202,7 @@ def _one_by_one(left: list[Task]) -> Iterator[tuple[str, Row]]:
             with _processes(1) as executor:
                 while left:
                     key, scene, quantity, options = left[0]
-                    row = executor.submit(compute, scene, quantity, options).result()
+                    row = _submit(executor, compute, scene, quantity, options).result()
                     left.pop(0)
                     yield key, row
         except BrokenProcessPool:

@@ -26,6 +26,7 @@ from ..results.store import scene_text
 from ..results.sweep import Plan, Sweep, common_scales
 from ..scene import Scene
 from ..scene.keys import MAX_SCENES, set_key
+from ..scene.own import own_identity
 from . import parallel
 from .sweep_rows import COMPUTED, UNEXPECTED, Options, Row, check, compute
 
@@ -115,7 +116,7 @@ def sweep(
             on_scene(len(rows), len(grid.distinct), failed)
         tasks = grid.tasks(set(rows))
         missing = len(grid.distinct) - len(rows)
-        for key, row in _computed(tasks, workers, scheduler) if missing else ():
+        for key, row in _computed(tasks, workers, scheduler, parallel.sendable(scene)) if missing else ():
             rows[key] = row
             failed += not row.values
             _keep(kept, key, row)
@@ -183,6 +184,7 @@ def plan_sweep(
 class _Grid:
     """All scenes of a sweep. It holds their keys alone: a scene is made when its turn comes."""
 
+    scene: Scene
     tables: Mapping[str, Any]
     over: Mapping[str, tuple[Any, ...]]
     quantity: str
@@ -195,30 +197,30 @@ class _Grid:
         if not isinstance(scene, Scene):
             raise InputError("scene", scene, "a Scene is allowed")
         values = _checked(over)
-        tables = scene.to_dict()
+        tables = scene.record()
         if quantity not in COMPUTED or not values:  # the rest is asked of each scene below
             check(scene, quantity, options)
         keys = []
-        for changed in _scenes(tables, values):
+        for changed in _scenes(scene, tables, values):
             check(changed, quantity, options)
             keys.append(_key(changed, quantity, options))
         first = {key: place for place, key in reversed(list(enumerate(keys)))}
-        return cls(tables, values, quantity, options, tuple(keys), dict(sorted(first.items(), key=lambda item: item[1])))
+        return cls(scene, tables, values, quantity, options, tuple(keys), dict(sorted(first.items(), key=lambda item: item[1])))
 
     def tasks(self, known: set[str]) -> Iterator[parallel.Task]:
         """What is to be computed, each scene once."""
-        for place, (key, scene) in enumerate(zip(self.keys, _scenes(self.tables, self.over), strict=True)):
+        for place, (key, scene) in enumerate(zip(self.keys, _scenes(self.scene, self.tables, self.over), strict=True)):
             if key not in known and self.distinct[key] == place:
                 yield key, scene, self.quantity, self.options
 
 
-def _scenes(tables: Mapping[str, Any], over: Mapping[str, tuple[Any, ...]]) -> Iterator[Scene]:
+def _scenes(scene: Scene, tables: Mapping[str, Any], over: Mapping[str, tuple[Any, ...]]) -> Iterator[Scene]:
     """The scenes of a grid, the last key fastest."""
     for values in itertools.product(*over.values()):
         changed: Mapping[str, Any] = tables
         for key, value in zip(over, values, strict=True):
             changed = set_key(changed, key, value)
-        yield Scene.from_dict(changed)
+        yield Scene.from_dict(changed, own=scene)
 
 
 def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
@@ -244,13 +246,15 @@ def _checked(over: Any) -> dict[str, tuple[Any, ...]]:
 
 
 def _key(scene: Scene, quantity: str, options: Options) -> str:
-    """The hash of everything that a row depends on. The title plays no part."""
+    """The hash of everything that a row depends on. Neither the title nor the files of a run play a part."""
     from .. import __version__
 
-    tables = {name: table for name, table in scene.to_dict().items() if name != "title"}
+    tables = {name: table for name, table in scene.record().items() if name not in ("title", "output")}
     # earlier versions kept rows of membranes with their inside above with other signs
     signs = ["inside above"] if side(scene.mesh) < 0 else []
-    text = json.dumps([_canonical(tables), quantity, _canonical(asdict(options)), __version__, *signs], sort_keys=True)
+    text = json.dumps(
+        [_canonical(tables), quantity, _canonical(asdict(options)), __version__, *signs, *own_identity(scene)], sort_keys=True
+    )
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -276,14 +280,17 @@ def _workers(workers: Any, scheduler: Any) -> int | None:
     return number
 
 
-def _computed(tasks: Iterator[parallel.Task], workers: int | None, scheduler: str | None) -> Iterator[tuple[str, Row]]:
+def _computed(tasks: Iterator[parallel.Task], workers: int | None, scheduler: str | None, sendable: bool) -> Iterator[tuple[str, Row]]:
     """The rows of tasks, from a cluster, from processes or from this process.
 
     Without orders this process begins, and processes are started for what is left after ``_ALONE`` seconds.
     """
+    if not sendable and ((workers or 1) > 1 or scheduler is not None):
+        advice = "define its functions and classes in a module, or leave workers and scheduler out"
+        raise InputError("scene", "a function or class of a script", f"it cannot be sent to other processes: {advice}")
     if scheduler is not None:
         yield from parallel.on_cluster(tasks, scheduler)
-    elif workers is None and parallel.cores() > 1:
+    elif workers is None and parallel.cores() > 1 and sendable:
         end = time.monotonic() + _ALONE
         for row in parallel.here(tasks):
             yield row

@@ -233,7 +233,7 @@ class _Page:
 
     def _scene(self) -> str:
         parts = []
-        for name, content in self.branch.scene.to_dict().items():
+        for name, content in self.branch.scene.record().items():
             if name == "title":
                 continue
             for number, part in enumerate(content if isinstance(content, list) else [content]):

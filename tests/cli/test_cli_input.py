@@ -204,7 +204,7 @@ def main(tmp_path):
 def test_done_in_a_pipe_says_what_was_written(stand_in, tmp_path, capsys):
     written = stand_in(lambda scene, on_step: Branch(scene, steps(scene, on_step, 3)))
     assert main(tmp_path) == cli.DONE
-    assert capsys.readouterr() == (f"3 equilibria, written:\n  {tmp_path}/branch.csv\n", "")
+    assert capsys.readouterr() == (f"3 equilibria, written: {tmp_path}/branch.csv\n", "")
     assert len(written) == 1
     assert written[0].scene == Scene.from_toml(DEMO)
 

@@ -137,7 +137,7 @@ def killed(control: str, trials: int, seed: int) -> int:
         clock = time.perf_counter()
         done = ended(started(scene, whole, pause=0.1))
         length = time.perf_counter() - clock
-        expect(done == Done(0), done)
+        expect(done.succeeded, done)
         good = 0
         for trial in range(trials):
             target = out.with_name(f"out{trial}")
@@ -148,7 +148,7 @@ def killed(control: str, trials: int, seed: int) -> int:
                 process.communicate()
                 expect((bad := torn(target)) == [], (trial, bad))
             last = resumed(scene, target)
-            expect(last == Done(0) or (last.code == 0 and "nothing to resume" in last.err), last)
+            expect(last.succeeded or (last.code == 0 and "nothing to resume" in last.err), last)
             expect(table(target) == table(whole), f"trial {trial}: another branch")
             expect(not torn(target) and not any(p.name.startswith(".") for p in target.rglob("*")), f"trial {trial}: leftovers")
             expect(not (target / checkpoint.NAME).exists(), f"trial {trial}: a checkpoint is left")
@@ -167,7 +167,7 @@ def interrupted() -> Done:
         expect((bad := torn(out)) == [], bad)
         kept = table(out)
         expect(json.loads((out / output.RECORD).read_text())["status"] == "interrupted" and 0 < len(kept) < 40, len(kept))
-        expect(resumed(scene, out) == Done(0), "not resumed")
+        expect(resumed(scene, out).succeeded, "not resumed")
         expect(table(out)[: len(kept)] == kept and len(table(out)) == 40, "another branch")
         return Done(done.code, done.out, re.sub(r"\d+ equilibri\w+", "some equilibria", done.err.replace(str(out), "out")))
 
@@ -183,7 +183,7 @@ def two_at_once() -> Done:
         first.communicate()  # which also closes its pipes
         expect(f"process {first.pid} " in second.err, second)
         scene.write_text(SCENE + CONTROLS["volume"], encoding="utf-8")
-        expect(command("run", str(scene), "--out", str(out)) == Done(0), "the lock of a killed run is in the way")
+        expect(command("run", str(scene), "--out", str(out)).succeeded, "the lock of a killed run is in the way")
         words = second.err.replace(str(out), "out").partition(", a folder")[0].split()
         number = words.index("process")
         return Done(second.code, second.out, " ".join([*words[: number + 1], "N", "on this host", *words[words.index("is") :]]) + "\n")
@@ -193,7 +193,7 @@ def two_at_once() -> Done:
 def full_disk() -> Done:
     """Every result but the table meets a full disk; there is room for the checkpoint, and --resume writes the rest."""
     with workshop(CONTROLS["volume"]) as (scene, whole, out):
-        expect(command("run", str(scene), "--out", str(whole)) == Done(0), "the run itself")
+        expect(command("run", str(scene), "--out", str(whole)).succeeded, "the run itself")
 
         def full(name: str, *_: object) -> None:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -202,7 +202,7 @@ def full_disk() -> Done:
             done = command("run", str(scene), "--out", str(out))
         names = sorted(p.name for p in out.iterdir())
         expect(names == ["branch.csv", "checkpoint.nc", "membrane", "pressure-volume.png"] and not torn(out), names)
-        expect(resumed(scene, out) == Done(0), "not resumed")
+        expect(resumed(scene, out).succeeded, "not resumed")
         expect(table(out) == table(whole) and not (out / checkpoint.NAME).exists(), "another branch")
         return Done(done.code, done.out, done.err.replace(str(out), "out"))
 
@@ -229,7 +229,7 @@ def no_large_files() -> Done:
 @FAMILY.case("resumed with another scene", "two branches in one table", Exit(2, "mesh.elements is 5, was 4; run.stop is 70.0, was 75.0"))
 def another_scene() -> Done:
     with workshop(CONTROLS["volume"]) as (scene, _, out):
-        expect(resumed(scene, out) == Done(0), "an empty folder is no obstacle")
+        expect(resumed(scene, out).succeeded, "an empty folder is no obstacle")
         before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
         again = resumed(scene, out)
         expect(again.code == 0 and "nothing to resume" in again.err, again)

@@ -87,9 +87,16 @@ class Stop:
         return f"status {self.status}" if isinstance(self.status, fm.Status) else f"bad input: {self.status}"
 
 
+#: what is said as soon as an interrupt arrives
+_ACKNOWLEDGED = "femmembrane: interrupted; what is being computed or written is finished first; Ctrl-C again drops it\n"
+
+
 @dataclass(frozen=True)
 class Exit:
-    """The exit code of a command, and words of the one line that it writes to stderr (nothing at all when it is 0)."""
+    """The exit code of a command, and words of the one line that it writes to stderr. With 0 there is none, and one of success on stdout.
+
+    An interrupt is acknowledged at once, in a line of its own.
+    """
 
     code: int
     words: str = ""
@@ -97,12 +104,15 @@ class Exit:
     def fault(self, got: Any) -> str:
         if not isinstance(got, Done):
             return f"{got!r} in place of a command that ended"
-        if got.out or got.err.count("\n") != (0 if self.code == 0 else 1):
+        err = got.err.replace(_ACKNOWLEDGED, "", 1)
+        line = self.code == 0 and got.out.count("\n") == 1 and "written: " in got.out
+        if (got.out and not line) or err.count("\n") != (0 if self.code == 0 else 1):
             return f"printed {got.out!r} and {got.err!r}"
-        return _wrong(self.code, got.code, self.words, got.err)
+        return _wrong(self.code, got.code, self.words, err)
 
     def shown(self, got: Any) -> str:
-        return f"{got.code}" + (f": {_short(got.err)}" if got.err else "")
+        err = got.err.replace(_ACKNOWLEDGED, "", 1)
+        return f"{got.code}" + (f": {_short(err)}" if err else "")
 
     def __str__(self) -> str:
         return f"exit code {self.code}"
@@ -123,6 +133,11 @@ class Done:
     code: int
     out: str = ""
     err: str = ""
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether it ended well and had nothing to complain of; what it computed and wrote is said on its output."""
+        return self.code == 0 and not self.err
 
 
 Expected = Number | Stop | Exit

@@ -312,8 +312,7 @@ def test_a_source_of_ones_own():
     eq = fm.equilibrium(scene, volume=2.0)
     assert eq.pressure == pytest.approx(shoot(scene, volume=2.0, guess=Guess.of(eq)).pressure, rel=1e-8)
     assert eq.verdict(azimuthal=1).stable is True
-    with pytest.raises(fm.InputError, match="it has no name in scene files"):
-        scene.to_dict()
+    assert scene.to_dict()["source"] == [{"kind": f"{__name__}:Gradient", "k": 0.2}]  # files: tests/scene/test_own.py
     with pytest.raises(fm.InputError, match="derived from Source"):
         magnetic_scene(type("Mine", (), {"field": Gradient.field})())
 

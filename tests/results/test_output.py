@@ -364,3 +364,22 @@ def test_every_column_of_the_table_can_be_asked_for():
     for name, column in zip(names, zip(*table.rows(branch), strict=True), strict=True):
         assert branch.column(name).tolist() == list(column)
     assert branch.column("status").tolist() == [Status.CONVERGED.value] * 2
+
+
+def test_surfaces_are_left_out_where_the_scene_says_so_and_packed_where_not(tmp_path):
+    scene = Scene(material=NeoHookean(), mesh=disc(8))
+    output.write_run(inflate(scene, volumes=[0.5, 1.0]), tmp_path)
+    surfaces = sorted((tmp_path / "membrane").glob("*.vtu"))
+    assert len(surfaces) == 2
+    assert b"vtkZLibDataCompressor" in surfaces[0].read_bytes()[:400]
+
+    bare = scene.replace(vtu=False)
+    assert Scene.from_dict(bare.to_dict()) == bare
+    assert "output" not in scene.to_dict()
+    names = {path.name for path in output.write_run(inflate(bare, volumes=[0.5, 1.0]), tmp_path)}
+    assert "branch.nc" in names
+    assert "membrane.pvd" not in names
+    assert not list(tmp_path.rglob("*.vtu"))  # those of the run before are gone as well
+    assert not store.load(tmp_path).scene.vtu
+    with pytest.raises(InputError, match=r"output\.vtu"):
+        Scene.from_dict({**scene.to_dict(), "output": {"vtu": "no"}})

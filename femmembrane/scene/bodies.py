@@ -49,13 +49,19 @@ def check_obstacles(scene: Scene, lift: Lift | None) -> None:
     for path, body in zip(paths, scene.bodies, strict=True):
         gap = body.gap(R, Z)
         if not (gap[inner].min() > 0 and gap.min() >= -LEAST_LENGTH * size):
-            where = int(gap.argmin())
-            allowed = f"it cuts the membrane at rest (at r = {R[where]:.4g}, z = {Z[where]:.4g}); move it off"
-            raise InputError(path, body.label(), allowed)
+            raise InputError(path, body.label(), _in_the_way(body, gap, R, Z))
     for k, one in enumerate(scene.bodies):
         for j, other in enumerate(scene.bodies):
             if j != k and one.bounded and _enters(one, other, size):
                 raise InputError(paths[k], one.label(), f"it overlaps the {other.label()}; obstacles apart from each other are allowed")
+
+
+def _in_the_way(body: Obstacle, gap: Array, R: Array, Z: Array) -> str:
+    """What is wrong with a body that the membrane at rest is not clear of."""
+    if gap.max() < 0:
+        return "the membrane at rest lies inside it; move it off" + (", or take its other side" if hasattr(body, "side") else "")
+    where = int(gap.argmin())
+    return f"it cuts the membrane at rest (at r = {R[where]:.4g}, z = {Z[where]:.4g}, over R0); move it off"
 
 
 def _enters(one: Obstacle, other: Obstacle, size: float) -> bool:

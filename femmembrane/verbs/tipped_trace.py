@@ -94,7 +94,7 @@ class TippedRun:
             scene = onset.scene
         self.scene, self.request, self.on_step = scene, request, on_step
         self.potential: Potential = potential_of(scene)
-        if potential_of(onset.scene) is not self.potential:
+        if potential_of(onset.scene).root is not self.potential.root:  # a state in contact has its own mesh
             raise InputError("start", "azimuthal_onset", "one of the special_points of a branch of this scene is allowed")
         if reason := refusal(self.potential):
             raise InputError("start", "azimuthal_onset", f"the states beyond it are not computed: {reason}")

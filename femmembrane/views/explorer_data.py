@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolveError, Status
-from ..quantities import PLACES, PROFILE, Units, axis_label, heading_in, key_label, quantity
+from ..quantities import PLACES, PROFILE, SCALED, Units, axis_label, heading_in, in_si, key_label, quantity
 from ..results.analyses import asked, column_heading, known_quantity
 from ..results.analyses.verdicts import Verdicts
 from ..results.curve import specials_between
@@ -32,7 +32,7 @@ from .backend import load
 from .branch_lines import MARKERS, Strands, answer
 from .figures import AMONG, Style
 from .picture import zone_colors
-from .surroundings import Box, surroundings
+from .surroundings import Box, named, surroundings
 from .svg import dark
 from .vtk import Array, finite_at_ends, spread
 from .zones import PATTERNS
@@ -93,7 +93,7 @@ def page_data(branch: Branch, units: str = "scaled", *, shapes: bool = True) -> 
     """
     load()
     chosen = Units.of(units, branch.scene.converter)
-    names = drawn_columns(branch)
+    names = drawn_columns(branch, chosen)
     strands, states = Strands.of(branch, names, chosen), states_of(branch)
     places = [strands.points[s.place] if s.step is None else strands.steps[s.step] for s in states]
     left_out = len(branch) - sum(state.step is not None for state in states)
@@ -119,9 +119,11 @@ def page_data(branch: Branch, units: str = "scaled", *, shapes: bool = True) -> 
     }
 
 
-def drawn_columns(branch: Branch) -> list[str]:
-    """The columns of a branch that its axes may show."""
-    return [name for name in columns(branch) if name not in _NOT_DRAWN and known_quantity(name).type is not str]
+def drawn_columns(branch: Branch, units: Units = SCALED) -> list[str]:
+    """The columns of a branch that its axes may show, each quantity once in these units."""
+    found = [name for name in columns(branch) if name not in _NOT_DRAWN and known_quantity(name).type is not str]
+    shown = {in_si(name) for name in found if units.unit(name)}
+    return [name for name in found if name not in shown]
 
 
 def _left_out(count: int) -> list[str]:
@@ -267,11 +269,20 @@ def _room(shown: Sequence[Equilibrium], units: Units) -> dict[str, Any]:
     box = Box.of([equilibrium.profile() for equilibrium in shown])
     around, length = surroundings(shown[0].scene, box), units.factor("rho")
     bodies = [
-        {"label": body.label, "moment": body.moment, "rigid": body.rigid, "rho": [_rounded(length * r, 6) for r, _ in body.points]}
+        {
+            "label": named(body.label, units),
+            "moment": body.moment,
+            "rigid": body.rigid,
+            "rho": [_rounded(length * r, 6) for r, _ in body.points],
+        }
         | {"z": [_rounded(length * z, 6) for _, z in body.points]}
         for body in around.near
     ]
-    return {"bodies": bodies, "absent": list(around.absent), "box": [_rounded(length * v, 6) for v in (box.radius, box.low, box.high)]}
+    return {
+        "bodies": bodies,
+        "absent": [named(label, units) for label in around.absent],
+        "box": [_rounded(length * v, 6) for v in (box.radius, box.low, box.high)],
+    }
 
 
 # --- numbers

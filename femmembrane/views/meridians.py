@@ -9,7 +9,7 @@ import numpy as np
 
 from ..quantities import SCALED, Units, axis_label
 from .figures import RED, Style
-from .surroundings import Box, clamped_ends, surroundings
+from .surroundings import Box, clamped_ends, named, surroundings
 from .vtk import smooth_profile
 from .zones import draw_meridian_zones
 
@@ -43,7 +43,7 @@ def draw_surroundings(axes: Axes, shown: Sequence[Equilibrium], units: Units = S
     axes.set_xlabel(axis_label("rho", units))
     axes.set_ylabel(axis_label("eta", units))
     axes.set_aspect("equal", adjustable="box")
-    axes.locator_params(nbins=6)
+    axes.locator_params(axis="x", nbins=6)  # heights have as many as there is room for beside a flat shape
     length = units.factor("rho")
     for rho, eta in ((length * rho, length * eta) for _, rho, eta in clamped_ends(shown[0])):
         axes.axhline(eta, color="0.8", linewidth=0.8, zorder=0)
@@ -67,13 +67,6 @@ def _draw_sources(axes: Axes, shown: Sequence[Equilibrium], units: Units) -> Non
         point: dict[str, Any] = {"marker": "o", "markersize": 6} if rho.size == 1 else {}
         look: dict[str, Any] = {"color": "0.45" if body.rigid else RED, "linewidth": 2.5, **point}
         for side in (1, -1) if rho.any() else (1,):
-            axes.plot(side * rho, z, label=_named(body.label, units) if side > 0 and body.label else None, **look)
+            axes.plot(side * rho, z, label=named(body.label, units) if side > 0 and body.label else None, **look)
     for name in around.absent:
-        axes.plot([], [], " ", label=f"({_named(name, units)})")
-
-
-def _named(label: str, units: Units) -> str:
-    """The label of a source; a height at its end is given in the units of the picture."""
-    what, at, height = label.rpartition(" at height ")
-    unit = units.unit("eta")
-    return f"{what}{at}{units.factor('eta') * float(height):.4g} {unit}" if at and unit else label
+        axes.plot([], [], " ", label=f"({named(name, units)})")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..checks import whole
 from ..physics.outline import Outline
+from ..quantities import Units
 
 if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
@@ -91,6 +92,13 @@ def surroundings(scene: Scene, box: Box) -> Surroundings:
             absent.append(obstacle.label())
         near += [Outline("" if k else obstacle.label(), part, rigid=True) for k, part in enumerate(parts)]
     return Surroundings(tuple(near), tuple(absent))
+
+
+def named(label: str, units: Units) -> str:
+    """The label of a body; a height at its end is given in the units of the picture."""
+    what, at, height = label.rpartition(" at height ")
+    unit = units.unit("eta")
+    return f"{what}{at}{units.factor('eta') * float(height):.4g} {unit}" if at and unit else label
 
 
 def clamped_ends(equilibrium: Equilibrium, nodes: int = 2) -> list[tuple[int, float, float]]:

@@ -384,3 +384,28 @@ def test_contact_is_told_in_si_units_of_a_scene_with_scales():
     assert not [name for name in fm.inflate(plate(elements=8), volumes=[0.4]).to_dataframe() if name.endswith(("_m", "_n", "_m2"))]
     said = f"a force of {row.contact_force_n * 1e3:.4g} mN" if row.contact_force_n < 1 else f"a force of {row.contact_force_n:.4g} N"
     assert any(said in remark.text for remark in ContactWithBodies().remarks(branch[-1]))
+
+
+def test_an_onset_in_contact_is_refused_for_the_contact():
+    """It is a special point of a branch of its scene, though the mesh there follows the border of contact."""
+    scene = plate(elements=16, analysis=fm.Analysis(azimuthal_modes=(1,)))
+    branch = fm.trace(scene, start=1.8, until={"volume": 2.6})
+    onset = next(p for p in branch.special_points if p.kind == "azimuthal_onset")
+    assert onset.equilibrium.contact.touching
+    with pytest.raises(fm.InputError, match="the states beyond it are not computed: the membrane may touch an obstacle"):
+        fm.trace(branch.scene, start=onset, until={"volume": 2.4})
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (fm.Plane(0.5, side="above"), "lies inside it; move it off, or take its other side"),
+        (fm.Ball(0.0, 3.0), "lies inside it; move it off"),
+        (fm.Ball(0.2, 0.3), "cuts the membrane at rest (at r = 0, z = 0, over R0)"),
+    ],
+)
+def test_a_body_on_the_wrong_side_is_not_said_to_cut(body, said):
+    with pytest.raises(fm.InputError) as error:
+        fm.Scene(material=NH, mesh=fm.disc(4), obstacles=[body])
+    assert said in str(error.value)
+    assert str(error.value).endswith("other side") is said.endswith("other side")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.errors import InputError
 from femmembrane.quantities import SCALED, Units, axis_label, caption, heading_in
-from femmembrane.views import plots
+from femmembrane.views import explorer_data, plots
 from femmembrane.views.report import report
 from tests.cases import disc_scene
 
@@ -98,3 +99,28 @@ def test_a_sweep_in_si_units(tmp_path):
     assert "pressure_pa" not in thicker.to_xarray()
     with pytest.raises(InputError, match="units = 'si'"):
         thicker.plot(units="si")
+
+
+def test_a_page_shows_each_quantity_once_and_names_bodies_in_its_units():
+    """A plate at 0.5 R0 is one at 10 mm; its force is in mN or N, and not a second time in the column for programs."""
+    scene = fm.Scene(fm.NeoHookean(), mesh=fm.disc(8), obstacles=[fm.Plane(0.5)], scales=SCALES)
+    run = fm.inflate(scene, volumes=[0.4, 1.2])
+    in_mm, scaled = (explorer_data.page_data(run, units) for units in ("si", "scaled"))
+    assert [body["label"] for body in in_mm["bodies"]] == ["plane at height 10 mm"]
+    assert [body["label"] for body in scaled["bodies"]] == ["plane at height 0.5"]
+    names = {one["name"]: one["label"] for one in in_mm["quantities"]}
+    assert names["contact_force"].startswith("force on bodies in ")
+    assert not names.keys() & {"contact_force_n", "volume_m3", "pressure_pa", "least_gap_m"}
+    assert "volume_m3" in {one["name"] for one in scaled["quantities"]}
+
+
+def test_heights_of_a_flat_shape_do_not_cover_each_other():
+    scene = fm.Scene(fm.NeoHookean(), mesh=fm.disc(8), scales=SCALES)
+    figure = plots.plot_profiles(fm.inflate(scene, volumes=[0.2, 0.4]), units="si")
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    boxes = [tick.label1.get_window_extent() for tick in axes.yaxis.get_major_ticks() if tick.label1.get_visible()]
+    low, high = axes.get_window_extent().intervaly
+    shown = sorted(tuple(box.intervaly) for box in boxes if low - 1 <= sum(box.intervaly) / 2 <= high + 1)
+    assert len(shown) >= 2
+    assert all(below[1] <= above[0] for below, above in pairwise(shown))

@@ -41,6 +41,8 @@ from .supports import POLE, Held, Support, checked_end, support_of
 
 #: size of a curve beyond which squares and cubes of it are no numbers any more, and below the inverse of which they are zero
 _LARGEST = 1e60
+#: angle in radians between cells that are one curve for the eye and for stresses
+_SMOOTH = 1e-3
 #: points and weights for the length of a curved cell
 _GAUSS = np.polynomial.legendre.leggauss(12)
 
@@ -130,6 +132,23 @@ class Curve:
     @property
     def shape(self) -> str:
         return "curve"
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was done about the points, and what a polygon means for stresses."""
+        turn = self._largest_turn()
+        if self.curved or turn < _SMOOTH:
+            return self.repaired
+        polygon = f"a polygon of {self._n_cells} straight cells, which turns by up to {math.degrees(turn):.2g} degrees where they meet"
+        advice = "stresses across the meridian jump there; cells with a point inside are arcs, and smoother"
+        return (*self.repaired, f"{polygon}: {advice}")
+
+    def _largest_turn(self) -> float:
+        """The largest angle between neighbouring cells, for straight ones."""
+        a, _, b = self._nodes
+        along = (b - a) @ np.array([1.0, 1.0j])
+        after = np.append(along[1:], along[:1] if self.closed else along[-1:])
+        return float(np.abs(np.angle(after / along)).max())
 
     @property
     def closed(self) -> bool:

@@ -267,3 +267,15 @@ def test_a_curve_is_checked_and_directed_when_it_is_made() -> None:
 def test_points_whose_squares_are_no_numbers_are_refused(size):
     with pytest.raises(fm.InputError, match=r"mesh\.points"):
         fm.meridian_from_points([(0.0, 0.0), (size, 0.0)])
+
+
+def test_a_polygon_is_called_one():
+    """Straight cells that turn where they meet have a remark, with the largest angle; straight lines and arcs have none."""
+    arc = np.linspace(0, np.pi / 2, 9)
+    points = [(0.0, 1.0), *((float(np.sin(a)), float(np.cos(a))) for a in arc[1:-1]), (1.0, 0.0)]
+    polygon = fm.meridian_from_points(points)
+    (note,) = polygon.remarks
+    assert note.startswith("a polygon of 8 straight cells, which turns by up to 11 degrees where they meet")  # 90/8 degrees
+    assert fm.inflate(fm.Scene(fm.NeoHookean(), polygon), volumes=[2.5]).notes == (f"mesh: {note}",)
+    assert fm.meridian_from_points([(0.3, 0.0), (0.6, 0.0), (1.0, 0.0)]).remarks == ()
+    assert fm.meridian_from_points(points, [(0, 2, 1), (2, 4, 3), (4, 6, 5), (6, 8, 7)]).remarks == ()

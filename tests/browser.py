@@ -111,11 +111,23 @@ class Page:
                 raise TimeoutError(f"{condition} does not come true: {self.errors}")
             time.sleep(0.02)
 
-    def click(self, x: float, y: float) -> None:
-        """Move the mouse to a place of the window, and click."""
-        for kind, button in (("mouseMoved", "none"), ("mousePressed", "left"), ("mouseReleased", "left")):
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1 if button == "left" else 0)
+    def click(self, x: float, y: float, seen: str = "true") -> None:
+        """Move the mouse to a place of the window until the page has seen it there, and click."""
+        end, move = time.monotonic() + _PATIENCE, 0
+        while True:  # a page that is busy may miss a single movement
+            self._mouse("mouseMoved", x + move % 2, y, "none")
+            time.sleep(0.1)
+            if self.ask(seen):
+                break
+            if time.monotonic() > end:
+                raise TimeoutError(f"{seen} does not come true: {self.errors}")
+            move += 1
+        for kind in ("mousePressed", "mouseReleased"):
+            self._mouse(kind, x + move % 2, y, "left")
             time.sleep(0.05)
+
+    def _mouse(self, kind: str, x: float, y: float, button: str) -> None:
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1 if button == "left" else 0)
 
     def press(self, key: str) -> None:
         """Press a key and release it."""

@@ -251,7 +251,7 @@ def test_clicks_and_keys_in_a_browser(branch: fm.Branch, data: dict[str, Any], t
             "(() => { const plot = byId('diagram'), box = plot.getBoundingClientRect(), of = plot._fullLayout;"
             f" return [box.left + of.xaxis._offset + of.xaxis.l2p({volume}), box.top + of.yaxis._offset + of.yaxis.l2p({pressure})]; }})()"
         )
-        page.click(x, y)
+        page.click(x, y, seen="(byId('diagram')._hoverdata || []).length > 0")
         page.wait(f"window.explorer.drawn === {wanted}")
         assert page.ask("byId('name').textContent") == data["states"][wanted]["name"]
         numbers = page.ask("[...byId('numbers').querySelectorAll('dd')].map((e) => e.textContent)")

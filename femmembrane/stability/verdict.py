@@ -43,8 +43,8 @@ def axisymmetric_verdict(
     choice("control", control, CONTROLS)
     form = bending_form(potential, evaluation.x)
     bending = None if form is None else form.at(0)
-    shown = None if bending is not None and bending.positive else apparent(potential, evaluation)
-    bad = unbounded_below(potential, evaluation, bending)
+    shown = apparent(potential, evaluation)
+    bad = None if shown is None else unbounded_below(potential, evaluation, bending)
     if bad is not None and slack_all_over(evaluation):
         return slack_verdict(control, 0)
     if bad is not None:
@@ -58,7 +58,8 @@ def axisymmetric_verdict(
         return _between(found, _smallest(potential, free, bending, constraint, soft, guess), control, potential)
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
-    unresolved = np.inf if shown else unresolved_axisymmetric(evaluation, found.mode, bending)
+    doubtful = shown is not None and not (bending is not None and bending.positive)
+    unresolved = np.inf if doubtful else unresolved_axisymmetric(evaluation, found.mode, bending)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
 
 
@@ -73,7 +74,8 @@ def _smallest(
     """The smallest eigenvalue of a state, with the nodes held that bodies hold in its evaluation."""
     start = None if guess is None else evaluation.reduced(guess)
     found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, compliance), start)
-    return replace(found, mode=evaluation.expanded(found.mode))
+    mode = evaluation.expanded(found.mode)
+    return found if mode is found.mode else replace(found, mode=mode)
 
 
 def _between(held: SmallestEigenvalue, free: SmallestEigenvalue, control: str, potential: Potential) -> Verdict:

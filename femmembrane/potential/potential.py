@@ -117,11 +117,13 @@ class Evaluation:
 
     def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
         """A number that belongs to this state, computed when first asked for under its name."""
-        if self._known is None:
-            self._known = {}
-        if name not in self._known:
-            self._known[name] = compute(self)
-        return self._known[name]
+        known = self._known
+        if known is None:
+            known = self._known = {}
+        value = known.get(name)
+        if value is None:
+            value = known[name] = compute(self)
+        return value
 
     @property
     def band(self) -> Array:

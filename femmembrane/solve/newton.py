@@ -83,10 +83,10 @@ def correct(
         ``status`` is CONVERGED only if the correction at x, relative to the size of u and of w, is below the tolerance: computed, or
         foretold from two corrections in quadratic convergence and confirmed by the residual at x and its correction by the factors before.
     """
+    if not potential.unsettled:
+        return _corrected(potential, control, x, pressure, magnetic, damped, tolerance, max_iterations)
     once = partial(_corrected, magnetic=magnetic, damped=damped, tolerance=tolerance, max_iterations=max_iterations)
-    if potential.unsettled:
-        return settled(once, control, potential, x, pressure, magnetic)
-    return once(potential, control=control, x=x, pressure=pressure)
+    return settled(once, control, potential, x, pressure, magnetic)
 
 
 def _corrected(

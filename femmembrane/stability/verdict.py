@@ -40,7 +40,8 @@ def axisymmetric_verdict(
     InputError
         For an unknown control, or "gas" without the gas.
     """
-    choice("control", control, CONTROLS)
+    if control not in CONTROLS:
+        choice("control", control, CONTROLS)
     form = bending_form(potential, evaluation.x)
     bending = None if form is None else form.at(0)
     shown = apparent(potential, evaluation)
@@ -132,12 +133,17 @@ def short_wave_verdict(where: str, confirmed: bool, control: str | None, n: int)
     return Verdict(False if confirmed else None, np.nan, np.nan, control, n, None, f"{kind}: {where}")
 
 
+#: what each control holds, in words
+_HELD = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}
+
+
 def against(control: str | None, n: int, electric: Electric | None = None) -> str:
     """A class of perturbations in words; with what is held of voltage and charge, which waves around the axis do not tell apart."""
     if n:
         return f"perturbations with {n} wave{'s' if n > 1 else ''} around the axis"
-    held = {"pressure": "at constant pressure", "volume": "of constant volume", "gas": "with a constant amount of gas"}[control or "volume"]
-    held += {"voltage": ", the voltage held,", "total_charge": ", the total charge held,"}.get(electric.load, "") if electric else ""
+    held = _HELD[control or "volume"]
+    if electric is not None:
+        held += {"voltage": ", the voltage held,", "total_charge": ", the total charge held,"}.get(electric.load, "")
     return f"axisymmetric perturbations {held}"
 
 

@@ -16,6 +16,8 @@ OUT = ROOT / "out" / "docs-demos"
 FOLDERS = {"demos": DEMOS, "paper": DEMOS / "paper"}
 #: what is run for a quick build
 QUICK = ("convergence.py", "materials.py", "figure_7.py")
+#: studies of ten minutes that start processes of their own: no build runs them
+STUDIES = ("fit_coverage.py",)
 HEADERS = {"demos": ("Scripts", "Each script prints a table and leaves pictures."), "paper": ("Figures of the paper", "Scripts for each.")}
 #: the number of pictures of one page
 MOST = 12
@@ -26,8 +28,10 @@ def scripts(folder: str) -> list[Path]:
 
 
 def pattern(names: Collection[str] | None) -> str:
-    """What sphinx-gallery finds in the paths of scripts that it runs."""
-    return r"\.py$" if names is None else "|".join(rf"[\\/]{re.escape(name)}$" for name in names)
+    """What sphinx-gallery finds in the paths of scripts that it runs: those of these names, or all but the studies."""
+    if names is None:
+        return rf"^(?!.*({'|'.join(map(re.escape, STUDIES))})$).*\.py$"
+    return "|".join(rf"[\\/]{re.escape(name)}$" for name in names)
 
 
 def title_of(docstring: str) -> str:

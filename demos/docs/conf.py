@@ -1,7 +1,7 @@
 """The documentation: built by ``python -m sphinx -W -b html demos/docs out/docs``, from the top of the repository.
 
-Every demo is run for its page, but for studies of ten minutes. With ``-t quick`` only a few are; the others show their pictures of ``demos/pictures``. The builder
-``linkcheck`` in place of ``html`` also asks the addresses outside, for which it needs the network.
+Every demo is run for its page, but for studies of ten minutes. With ``-t quick`` only a few are; the others show their pictures of
+``demos/pictures``. The builder ``linkcheck`` in place of ``html`` also asks the addresses outside, for which it needs the network.
 """
 
 import hashlib

@@ -16,9 +16,8 @@ from ..quantities import QUANTITIES, axis_label, words
 from ..results.fit import percent
 from .backend import title_text
 from .figures import save_figure, shown_figure
-from .html import pairs, table
-from .style import STYLE
-from .svg import dark, inline_svg, variable
+from .html import page_of, pairs, table
+from .svg import inline_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,33 +124,9 @@ def write_fit_report(fit: Fit, path: str | PathLike[str]) -> None:
         For a file that cannot be written.
     """
     svg, colors = inline_svg(plot_fit(fit), "measured and fitted, residuals below", "fit")
-    night = "".join(f"{variable(color)}:{dark(color)};" for color in sorted(colors))
     title = fit.scene.title or "Fitted numbers"
     bodies = "\n".join(f"<section>\n<h2>{escape(name)}</h2>\n{body}\n</section>" for name, body in _sections(fit, svg))
-    page = f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8"/>
-<meta name="viewport" content="width=device-width, initial-scale=1"/>
-<meta name="color-scheme" content="light dark"/>
-<link rel="icon" href="data:,"/>
-<title>{escape(title)}</title>
-<style>
-{STYLE}
-@media (prefers-color-scheme: dark) {{ :root {{ {night} }} }}
-</style>
-</head>
-<body>
-<header>
-<h1>{escape(title)}</h1>
-<p>{escape(fit.verdict)}</p>
-</header>
-<main>
-{bodies}
-</main>
-</body>
-</html>
-"""
+    page = page_of(title, f"<p>{escape(fit.verdict)}</p>", bodies, colors)
     with replace_file(path) as temporary:
         temporary.write_text(page, encoding="utf-8", errors="backslashreplace")
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from ..quantities import PLACES, title
 from ..results.analyses import column_heading, remarks
+from .style import STYLE
+from .svg import dark, variable
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
@@ -28,6 +30,45 @@ def text(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return ", ".join(text(item) for item in value)
     return escape(str(value))
+
+
+def page_of(title: str, head: str, body: str, colors: Iterable[str]) -> str:
+    """A whole page without links to a network: a title with what stands below it, and sections.
+
+    Parameters
+    ----------
+    title : str
+        Plain text.
+    head, body : str
+        Markup below the title, and of the sections.
+    colors : iterable of str
+        Of the pictures, which are darkened where the reader's screen is dark.
+    """
+    night = "".join(f"{variable(color)}:{dark(color)};" for color in sorted(colors))
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8"/>
+<meta name="viewport" content="width=device-width, initial-scale=1"/>
+<meta name="color-scheme" content="light dark"/>
+<link rel="icon" href="data:,"/>
+<title>{escape(title)}</title>
+<style>
+{STYLE}
+@media (prefers-color-scheme: dark) {{ :root {{ {night} }} }}
+</style>
+</head>
+<body>
+<header>
+<h1>{escape(title)}</h1>
+{head}
+</header>
+<main>
+{body}
+</main>
+</body>
+</html>
+"""
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[Any]], *, caption: str = "") -> str:

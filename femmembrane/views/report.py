@@ -22,10 +22,9 @@ from ..results.analyses import asked
 from ..results.analyses.base import Curves, Drawing, Section
 from . import plots
 from .backend import load
-from .html import branch_rows, pairs, table, text
-from .style import STYLE
+from .html import branch_rows, page_of, pairs, table, text
 from .surroundings import Box
-from .svg import dark, inline_svg, variable
+from .svg import inline_svg
 from .vtk import Array, smooth_profile
 from .zones import new_label
 
@@ -75,32 +74,7 @@ def report(branch: Branch, facts: Mapping[str, Any] | None = None, units: str = 
     title = branch.scene.title or "Inflated membrane"
     links = "".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name, _ in sections)
     bodies = "\n".join(f'<section id="{_anchor(name)}">\n<h2>{escape(name)}</h2>\n{body}\n</section>' for name, body in sections)
-    night = "".join(f"{variable(color)}:{dark(color)};" for color in sorted(page.colors))
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8"/>
-<meta name="viewport" content="width=device-width, initial-scale=1"/>
-<meta name="color-scheme" content="light dark"/>
-<link rel="icon" href="data:,"/>
-<title>{escape(title)}</title>
-<style>
-{STYLE}
-@media (prefers-color-scheme: dark) {{ :root {{ {night} }} }}
-</style>
-</head>
-<body>
-<header>
-<h1>{escape(title)}</h1>
-{page.summary()}
-<nav>{links}</nav>
-</header>
-<main>
-{bodies}
-</main>
-</body>
-</html>
-"""
+    return page_of(title, f"{page.summary()}\n<nav>{links}</nav>", bodies, page.colors)
 
 
 def _anchor(name: str) -> str:

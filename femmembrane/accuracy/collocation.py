@@ -169,7 +169,6 @@ class _Problem:
         """The state at places along the meridian."""
         y = np.empty((4, s.size))
         for k, leg in enumerate(self.form.legs):
-            x = leg.direction * (s - leg.start)
-            mine = x <= leg.length if leg.direction > 0 else x < leg.length
+            x, mine = leg.own(s)
             y[:, mine] = found.sol(x[mine])[4 * k : 4 * k + 4]
         return y

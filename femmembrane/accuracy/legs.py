@@ -58,10 +58,10 @@ class Leg:
         R, (R_s, Z_s) = self.mesh.position(s)[0], self.mesh.tangent(s)
         return R, self.direction * R_s, np.arctan2(self.direction * Z_s, self.direction * R_s)
 
-    def ends(self) -> tuple[float, float]:
-        """(R, Z) at the beginning."""
-        R, Z = self.mesh.position(np.array([self.start]))
-        return float(R[0]), float(Z[0])
+    def own(self, s: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Distances from the beginning of parameters s, and which of them lie on this leg; the middle belongs to one leg only."""
+        x = self.direction * (s - self.start)
+        return x, x <= self.length if self.direction > 0 else x < self.length
 
 
 def legs_of(mesh: Meridian) -> tuple[Leg, ...]:

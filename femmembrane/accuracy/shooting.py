@@ -183,8 +183,7 @@ class _Shooter:
         def at(s: Array) -> Array:
             y, begun = np.empty((4, s.size)), 0
             for leg, one in zip(self.form.legs, found, strict=True):
-                x = leg.direction * (s - leg.start)
-                mine = x <= leg.length if leg.direction > 0 else x < leg.length
+                x, mine = leg.own(s)
                 least = self.start if leg.pole else 0.0
                 y[:, mine] = one.sol(np.maximum(x[mine], least))[:4]
                 near = mine & (x < least)

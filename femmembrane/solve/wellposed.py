@@ -107,12 +107,13 @@ def _nearly_slack(evaluation: Evaluation) -> bool:
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation, an equilibrium or not, is ill-posed on its own mesh."""
     slack = potential.scene.tension_field
-    if potential.electric is None and not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:
-        return None  # the usual case needs no scale
+    taut = not slack and evaluation.once("least meridional stress", _least_meridional) >= 0
+    if taut and potential.electric is None:  # the usual case needs no scale
+        return None
     pulled = pulled_in(potential, evaluation)
     if pulled.size:
         return IllPosed(float(pulled.min()), float(pulled.max()), False, pulled=True)
-    if not slack and evaluation.once("least meridional stress", _least_meridional) >= 0:
+    if taut:
         return None
     scale = stress_scale(evaluation)
     if not slack and scale <= STRESS_FREE:

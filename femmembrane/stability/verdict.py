@@ -45,10 +45,9 @@ def axisymmetric_verdict(
     form = bending_form(potential, evaluation.x)
     bending = None if form is None else form.at(0)
     shown = apparent(potential, evaluation)
-    bad = None if shown is None else unbounded_below(potential, evaluation, bending)
-    if bad is not None and slack_all_over(evaluation):
-        return slack_verdict(control, 0)
-    if bad is not None:
+    if shown is not None and (bad := unbounded_below(potential, evaluation, bending)) is not None:
+        if slack_all_over(evaluation):
+            return slack_verdict(control, 0)
         return short_wave_verdict(f"{bad}, and the spectrum has no lower bound under refinement", bad.confirmed, control, 0)
     if control == "gas" and compliance is None:
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')

@@ -143,7 +143,7 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     _, row, corner = control.equation(space, state.x, state.pressure, evaluation)
     bordered = evaluation.border(row, corner)
     if parameter == "load":
-        return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
+        return bordered.solve(np.zeros(len(state.x)), 1.0)  # N = (quantity - load)
     if parameter == "number" and isinstance(potential, Family):
         rate = control_rate(potential, control, state.x, state.pressure, evaluation)
         return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)

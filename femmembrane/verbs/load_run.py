@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy.adapt import spread
-from ..accuracy.borders import holding
+from ..accuracy.borders import Solve, holding
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -170,7 +170,8 @@ class LoadRun(Run[Branch]):
                 state, turn = self.path.to(float(loads[index]), self.request.at_limit == "jump")
             with self.timed("verdicts"):
                 own, scene = self.own(state), self.scene_of(state)
-                new = record_on_borders(scene, own, holding(self.control), self.found[-1] if self.found else None, clock, self.gas)
+                solve: Solve = lambda onto, found: holding(self.control)(onto, found)  # noqa: E731  # hardly ever asked for
+                new = record_on_borders(scene, own, solve, self.found[-1] if self.found else None, clock, self.gas)
         except SolveError as error:
             return error.status, self._not_reached(index, str(error))
         if turn is not None:

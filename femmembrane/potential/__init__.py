@@ -5,11 +5,14 @@
 - :mod:`.replay`: the instructions of such a function, on whole vectors of points
 - :mod:`.potential`: values and derivatives at a state
 - :mod:`.family`: the potential of scenes that differ in one number
+- :mod:`.contact`: the potential before rigid bodies
+- :mod:`.contact_family`: that of scenes before bodies that differ in one number
 - :mod:`.numbered`: the potential of scenes that differ in several numbers
 - :mod:`.strain_energy`: strain energies of one's own
 """
 
 from ..kernels.interface import Array as Array
+from .contact_family import ContactFamily as ContactFamily
 from .family import Family as Family
 from .family import FoldDerivatives as FoldDerivatives
 from .numbered import NumberDerivatives as NumberDerivatives

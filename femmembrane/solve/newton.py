@@ -100,7 +100,7 @@ def _corrected(
     max_iterations: int,
 ) -> NewtonResult:
     """:func:`correct` on a potential that is smooth: that of a membrane without bodies, or on a set of nodes that bodies hold."""
-    x = potential.placed(np.ascontiguousarray(x, dtype=float))
+    x = potential.placed(np.ascontiguousarray(x, dtype=float), magnetic)
     evaluation = potential.evaluate(x, pressure, magnetic)
     previous, iteration, unbalance = np.inf, 0, np.inf
     while True:
@@ -121,7 +121,7 @@ def _corrected(
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
         length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
         x, pressure = (x + dx, pressure + dp) if length == 1 else (x + length * dx, pressure + length * dp)
-        x = potential.placed(x)
+        x = potential.placed(x, magnetic)
         evaluation = potential.evaluate(x, pressure, magnetic)
         iteration += 1
         # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, together
@@ -244,7 +244,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     # a component that is zero but for round-off, as along a tube that widens alone, has no size of its own
     units = [unit if unit > NEGLIGIBLE * max(units) else max(units) for unit in units]
     while length > 1e-4:
-        x, pressure = potential.placed(equations.x + length * dx), equations.pressure + length * dp
+        x, pressure = potential.placed(equations.x + length * dx, magnetic), equations.pressure + length * dp
         new = potential.evaluate(x, pressure, magnetic)
         unbalanced = new.unbalanced
         if max(potential.largest(unbalanced)) < np.inf:

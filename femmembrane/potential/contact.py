@@ -421,6 +421,13 @@ class ContactPotential(Potential):
         forces = self.with_poles(self.normal_forces(raw, gaps))
         return ContactEvaluation(raw, self, gaps, gaps.close & (forces >= -self._round_off(raw, gaps, pressure)))
 
+    def beside(self, x: Array, pressure: float) -> tuple[ContactEvaluation, ContactEvaluation]:
+        """A state in which a body is touched without a force, without the nodes that are held by none, and with all that lie on a body."""
+        raw = super().evaluate(x, pressure)
+        gaps = self.gaps(raw.x)
+        held = ContactEvaluation(raw, self, gaps, gaps.close)
+        return held.released() or held, held
+
     def _round_off(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Array:
         """Normal forces at the nodes that are round-off: on a nearly flat membrane those along the axis are much smaller than others."""
         u, w = raw.force_scale(pressure)

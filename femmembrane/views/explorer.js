@@ -3,7 +3,7 @@
 const byId = (id) => document.getElementById(id);
 const SECTORS = 48, FRAME = 50, AMPLITUDE = 0.12;
 const MARKERS = { limit_point: "circle", volume_fold: "square", height_fold: "triangle-up", number_fold: "hexagon",
-  branch_point: "diamond", azimuthal_onset: "triangle-down" };
+  branch_point: "diamond", azimuthal_onset: "triangle-down", touch: "triangle-right", release: "triangle-left" };
 const ZONED = "zone", night = matchMedia("(prefers-color-scheme: dark)"), calm = matchMedia("(prefers-reduced-motion: reduce)");
 let data = JSON.parse(byId("data").textContent);
 let now = 0, shown = 0, phase = 1, motion = null, playing = null, compared = [];

@@ -187,7 +187,7 @@ def test_a_slider_moves_the_curve(server: ThreadingHTTPServer) -> None:
 
 @needs_browser
 def test_the_curve_that_is_sketched_while_a_hand_moves_is_that_of_the_diagram(server: ThreadingHTTPServer) -> None:
-    """Its last corner, in pixels, is the place of the last equilibrium on the axes of the diagram; a curve that leaves them has new axes."""
+    """Its last corner, in pixels, is the last equilibrium on the axes of the diagram; a curve that leaves them has new axes."""
     with browser() as page:
         page.open(address(server))
         page.ask("ask()")

@@ -317,9 +317,7 @@ def test_the_key_and_waves_in_motion(below: fm.Branch, tmp_path: Path) -> None:
         assert page.ask("byId('key').querySelector('polygon').getAttribute('fill') === css('--ink')")
         assert "b = " in page.ask("(() => { byId('points').querySelector('button').click(); return byId('answers').textContent; })()")
         page.wait("window.explorer.drawn === shown")
-        page.ask(
-            "(() => { const mode = drawn.modes.find((m) => m.n === 1); mode.n = 40; byId('mode').value = drawn.modes.indexOf(mode); })()"
-        )
+        page.ask("(() => { const m = drawn.modes.find((m) => m.n === 1); m.n = 40; byId('mode').value = drawn.modes.indexOf(m); })()")
         page.ask("space()")
         assert page.ask("byId('space').data[0].x.length / drawn.rho.length") == 8 * 40
         assert page.ask("amplitude(chosenMode(drawn)) < 2 * Math.PI * data.box[0] / 40 / 2")

@@ -51,7 +51,7 @@ const joined = (parts, c) => parts.flatMap((part, k) => (k ? [null, ...part.valu
 const grouped = (lines) => [...Map.groupBy(lines, (line) => line.label).values()];
 function strands(of, x, y, look) {
   return grouped(of).map((same) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", name: same[0].label, x: joined(same, x),
-    y: joined(same, y), line: look(same[0]) }));
+    y: joined(same, y), line: { ...look(same[0]), simplify: false } }));
 }
 // An onset after which the membrane jumps has a filled marker. Plotly's own legend would be laid out anew at every redraw, which takes as
 // long as all the rest: what lines and markers mean stands below the diagram instead.
@@ -212,7 +212,8 @@ function modes(shape) {
 }
 function meridian(shape) {
   const mode = chosenMode(shape), size = amplitude(mode) * phase, rho = shape.rho, eta = shape.eta;
-  const line = (r, z, look) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false, x: r, y: z, ...look });
+  const line = (r, z, look) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false, x: r, y: z, ...look,
+    line: { ...look.line, simplify: false } }); // Plotly leaves out points of thick lines, and what is round gets corners
   const traces = [], seen = new Set();
   for (let a = 0, b; a < shape.zone.length; a = b) {
     for (b = a + 1; b < shape.zone.length && shape.zone[b] === shape.zone[a]; b++);

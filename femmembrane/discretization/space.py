@@ -20,7 +20,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, second_derivatives, shape_functions
+from .elements import gauss_points, lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -364,7 +364,7 @@ class Space(Numbering):
         if self.n_elements == 1 or self.degree > _RECOVERED:
             _, u_s, _, w_s = self.displacement(x, s)
             return u_s, w_s
-        gauss = (np.polynomial.legendre.leggauss(self.degree)[0] + 1) / 2
+        gauss = gauss_points(self.degree)
         ends, size = self.ends, self.sizes
         n_local = self.degree + 1
         slope = self.shape_functions(gauss)[1]

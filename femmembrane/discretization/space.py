@@ -113,12 +113,17 @@ class Space(Numbering):
         value, slope = shape_functions(self.degree, xi)
         if not self.nodal:
             return value, slope
-        at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
-        return value @ at_nodes, slope @ at_nodes
+        return value @ self._at_nodes, slope @ self._at_nodes
 
     def second_derivatives(self, xi: Array) -> Array:
         """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
-        return second_derivatives(self.degree, xi)
+        second = second_derivatives(self.degree, xi)
+        return second @ self._at_nodes if self.nodal else second
+
+    @property
+    def _at_nodes(self) -> Array:
+        """Coefficients of the hierarchical functions in those that are 1 at one node."""
+        return np.asarray(np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0]))
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""

@@ -32,7 +32,9 @@ from ..kernels.bordered import BorderedFactor
 from ..kernels.interface import Array, Border, Factor, Step
 from ..physics.obstacles import ROUND_OFF, Straight
 from ..threads import cached_property
-from .potential import Evaluation, Potential, potential_of
+from .evaluation import Evaluation
+from .of_scene import potential_of
+from .potential import Potential
 
 if TYPE_CHECKING:
     from ..discretization.space import Space

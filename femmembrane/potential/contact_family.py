@@ -22,8 +22,10 @@ from ..physics.loads import over_projection
 from ..physics.obstacles import Obstacle, rows_of
 from ..scene.variation import Parameter
 from .contact import ACROSS, Borders, ContactEvaluation, ContactPotential, Held, Mask
+from .evaluation import Evaluation
 from .family import Family
-from .potential import Evaluation, Potential, potential_of
+from .of_scene import potential_of
+from .potential import Potential
 
 if TYPE_CHECKING:
     from types import SimpleNamespace
@@ -191,6 +193,8 @@ class ContactFamily(ContactPotential, Family):
             shift[iw] = -gaps.n_eta[held] * rate
             shift[n] = 0.0
             force[:-1] += kernels().product(evaluation.raw.band, self.space.half_bandwidth, shift[:-1])
+            if (spring := evaluation.raw.spring) is not None:
+                force[:-1] += spring * float(spring @ shift[:-1])
             work = evaluation.forces[held]
             np.subtract.at(force, iu, work * a)
             np.subtract.at(force, iw, work * b)

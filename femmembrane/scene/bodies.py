@@ -75,7 +75,5 @@ def _enters(one: Obstacle, other: Obstacle, size: float) -> bool:
 def _refuse_effects(scene: Scene) -> None:
     """Refuse what is not computed before an obstacle."""
     key = "obstacle"
-    if scene.open:
-        raise InputError("mesh.accuracy", getattr(scene.mesh, "accuracy", None), "elements and degree are to be given with an obstacle")
     if scene.run is not None and getattr(scene.run, "number", None) is not None:
         raise InputError("run.over" if scene.run.over else "run.control", scene.run.number, f"not over a number beside an {key}")

@@ -28,11 +28,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..kernels import kernels
-from ..kernels.bordered import BorderedFactor
+from ..kernels.bordered import BorderedFactor, SpringFactor
 from ..kernels.interface import Array, Border, Factor, Step
 from ..physics.obstacles import ROUND_OFF, Straight
 from ..threads import cached_property
-from .potential import Evaluation, Potential, potential_of
+from .evaluation import Evaluation
+from .of_scene import potential_of
+from .potential import Potential
 
 if TYPE_CHECKING:
     from ..discretization.space import Space
@@ -194,6 +196,7 @@ class ContactEvaluation(Evaluation):
             potential,
             raw.elements,
             raw.factor,
+            None if raw.spring is None else self.reduction.projected(raw.spring),
         )
         self.held, self.gaps, self._raw = held, gaps, raw
         self.forces = np.where(held, potential.normal_forces(raw, gaps), 0.0)
@@ -249,11 +252,18 @@ class ContactEvaluation(Evaluation):
         lightest = np.abs(mass[2 * kd]).min()
         return self.reduction.band(mass, kd, np.full(self.reduction.out.shape, lightest))
 
+    def reduced_form(self, band: Array, half_bandwidth: int) -> Array:
+        return self.reduction.band(band, half_bandwidth)
+
     def factors(self) -> Factor:
-        return ReducedFactor(kernels().factor(self.band), self.reduction)
+        factor: Factor = kernels().factor(self.band)
+        if self.spring is not None:
+            factor = SpringFactor(factor, self.reduced(self.spring))
+        return ReducedFactor(factor, self.reduction)
 
     def inner(self, x: Array, y: Array) -> float:
-        return kernels().inner(self.band, self.potential.space.half_bandwidth, self.reduced(x), self.reduced(y))
+        own = kernels().inner(self.band, self.potential.space.half_bandwidth, self.reduced(x), self.reduced(y))
+        return own if self.spring is None else own + float(self.spring @ x) * float(self.spring @ y)
 
     def border(self, row: Array, corner: float) -> Border:
         return BorderedFactor(self.factors(), -self.volume_gradient, row, corner)
@@ -419,6 +429,13 @@ class ContactPotential(Potential):
         forces = self.with_poles(self.normal_forces(raw, gaps))
         return ContactEvaluation(raw, self, gaps, gaps.close & (forces >= -self._round_off(raw, gaps, pressure)))
 
+    def beside(self, x: Array, pressure: float) -> tuple[ContactEvaluation, ContactEvaluation]:
+        """A state in which a body is touched without a force, without the nodes that are held by none, and with all that lie on a body."""
+        raw = super().evaluate(x, pressure)
+        gaps = self.gaps(raw.x)
+        held = ContactEvaluation(raw, self, gaps, gaps.close)
+        return held.released() or held, held
+
     def _round_off(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Array:
         """Normal forces at the nodes that are round-off: on a nearly flat membrane those along the axis are much smaller than others."""
         u, w = raw.force_scale(pressure)
@@ -497,7 +514,7 @@ def gap_rows(potential: ContactPotential, y: ca.MX, p: ca.MX) -> ca.MX:
     """Gaps at the nodes over the size of the membrane, as functions of scaled unknowns y (scales p[2], p[3])."""
     R, Z = potential._rest
     (iu, iw), n = potential.place, potential.space.n_free
-    padded = ca.vertcat(y, 0)
+    padded = ca.vertcat(y[:n], 0)  # a voltage may stand behind the displacements
     rho = ca.DM(R) + p[2] * padded[np.minimum(iu, n).tolist()]
     eta = ca.DM(Z) + p[3] * padded[np.minimum(iw, n).tolist()]
     one, other = ca.SX.sym("rho"), ca.SX.sym("eta")

@@ -75,12 +75,6 @@ def _enters(one: Obstacle, other: Obstacle, size: float) -> bool:
 def _refuse_effects(scene: Scene) -> None:
     """Refuse what is not computed before an obstacle."""
     key = "obstacle"
-    if scene.tension_field:
-        raise InputError("effects.tension_field", True, "false is allowed with an obstacle: wrinkles against a body are not computed")
-    if scene.electric is not None and scene.electric.total_charge is not None:
-        raise InputError("electric.total_charge", scene.electric.total_charge, "a voltage is allowed with an obstacle")
-    if scene.bending:
-        raise InputError("effects.bending", True, "false is allowed with an obstacle: bending against a body is not computed")
     if scene.open:
         raise InputError("mesh.accuracy", getattr(scene.mesh, "accuracy", None), "elements and degree are to be given with an obstacle")
     if scene.run is not None and getattr(scene.run, "number", None) is not None:

@@ -127,7 +127,9 @@ def record_on_borders(
     found = put_on_borders(scene, scene, state, solve)
     if found.scene is scene:
         return record(scene, potential, state, previous, clock, gas)
-    new = record(found.scene, found.state.evaluation.potential, found.state, previous, clock, gas)
+    own = found.state.evaluation.potential
+    moved = found.scene.bordered(own.scene.borders) if own.obstacles else found.scene
+    new = record(moved, own, found.state, previous, clock, gas)
     there = potential, state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
     store(new, on_branch=recorded(scene, *there))
     return new

@@ -187,19 +187,9 @@ class ContactEvaluation(Evaluation):
         iu, iw = potential.place
         self.reduction = Reduction(iu[held], iw[held], gaps.n_rho[held], gaps.n_eta[held], space.n_free)
         forces = self.reduction.projected(raw._forces)
-        super().__init__(
-            raw.x,
-            raw.elastic_energy,
-            raw.magnetic_energy,
-            raw.volume,
-            raw.finite,
-            forces,
-            raw._densities,
-            potential,
-            raw.elements,
-            raw.factor,
-            None if raw.spring is None else self.reduction.projected(raw.spring),
-        )
+        answer = raw.elastic_energy, raw.magnetic_energy, raw.volume, raw.finite, forces, raw._densities
+        spring = None if raw.spring is None else self.reduction.projected(raw.spring)
+        super().__init__(raw.x, answer, potential, raw.elements, raw.factor, spring)
         self.held, self.gaps, self._raw = held, gaps, raw
         self.forces = np.where(held, potential.normal_forces(raw, gaps), 0.0)
 
@@ -352,7 +342,7 @@ class ContactPotential(Potential):
         space, ends = self.root.space, self.root.space.ends
         found = np.zeros(ends.size, dtype=bool)
         if space.n_elements > 1:
-            kinks = space._ends_of_elements[3][: space.n_elements - 1]
+            kinks = space.ends_of_elements[3][: space.n_elements - 1]
             found[1:-1] = kinks < 1e-6
             found[space.breaks] = False
         return found
@@ -443,7 +433,7 @@ class ContactPotential(Potential):
             judged[pole] += forces[neighbour]
         return judged
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         """As :meth:`.Potential.evaluate`, with the nodes held that lie on a body and are pushed away from it."""
         raw = super().evaluate(x, pressure, magnetic)
         gaps = self.gaps(raw.x, magnetic)
@@ -531,7 +521,7 @@ class Held(ContactPotential):
                 x[index[own]] -= (gaps.gap * normal)[own]
         return x
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         raw, known = Potential.evaluate(self, x, pressure, magnetic), self._looked_at
         same = known is not None and known[0] is raw.x and known[1] == magnetic
         return ContactEvaluation(raw, self, known[2] if known is not None and same else self.gaps(raw.x, magnetic), self.held)

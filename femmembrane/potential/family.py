@@ -265,11 +265,11 @@ class Member(Potential):
     def elements(self) -> Elements:
         return self.family.elements
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         """As :meth:`.Potential.evaluate`; with weaker sources it is the scene's own potential that answers."""
         if magnetic != 1.0:
             return potential_of(self.scene).evaluate(x, pressure, magnetic)
-        return self._evaluated(x, pressure, self.number, magnetic)
+        return super().evaluate(x, pressure, magnetic, self.number)
 
     @property
     def charged(self) -> Charged | None:

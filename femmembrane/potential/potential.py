@@ -256,17 +256,16 @@ class Potential(PointTerms):
     def _point(self) -> PointProgram:
         return PointProgram(self.point_function, self.point_data, None if self._like is None else self._like._point)
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
-        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
-        return self._evaluated(x, pressure, magnetic, magnetic)
-
-    def _evaluated(self, x: Array, pressure: float, slot: float, magnetic: float) -> Evaluation:
-        """:meth:`evaluate` with what the point function takes for the factor on sources and loads."""
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
+        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads. ``slot`` is what the
+        point function takes for it, where that is another number.
+        """
         elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
+        factor = magnetic if slot is None else slot
         if self.charged is None:
-            return Evaluation(x, *elements.evaluate(x, pressure, slot), self, elements, magnetic)
-        square, spring = self.charged.at(x, slot)
-        return Evaluation(x, *elements.evaluate(x, pressure, slot, square), self, elements, magnetic, spring)
+            return Evaluation(x, elements.evaluate(x, pressure, factor), self, elements, magnetic)
+        square, spring = self.charged.at(x, factor)
+        return Evaluation(x, elements.evaluate(x, pressure, factor, square), self, elements, magnetic, spring)
 
     def load_energy(self, x: Array, factor: float = 1.0) -> float:
         """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""

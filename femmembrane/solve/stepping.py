@@ -71,7 +71,6 @@ def march(
         ``result`` holds the states accepted before.
     """
     path = Predictor() if path is None else path
-    factor_of = (lambda value: magnetic) if parameter == "load" else (lambda value: value)
     if not path.sigma:
         path.append(start, joined(state.x, state.pressure), _carried_slope(potential, state, control_at(start), parameter, start))
     accepted = [state]
@@ -79,9 +78,9 @@ def march(
     spent = 0
     while here != stop:
         there = stop if abs(stop - here) <= abs(step) * (1 + 1e-12) else here + step
-        guess = path.predict(there)
+        guess, control = path.predict(there), control_at(there)
         x, pressure = guess[:-1], float(guess[-1])
-        result = corrector(potential, control_at(there), x, pressure, magnetic=factor_of(there))
+        result = corrector(potential, control, x, pressure, magnetic=magnetic if parameter == "load" else there)
         spent += result.iterations
         reach = distance(potential, x, accepted[-1].x)
         if (
@@ -93,7 +92,7 @@ def march(
             if _through_source(potential, accepted[-1], new, parameter):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"
                 raise SolveError(message, status=Status.DIPOLE_CONTACT, result=accepted)
-            path.append(there, joined(new.x, new.pressure), _carried_slope(potential, new, control_at(there), parameter, there))
+            path.append(there, joined(new.x, new.pressure), _carried_slope(potential, new, control, parameter, there))
             accepted.append(new)
             here, spent = there, 0
             step *= 2

@@ -344,7 +344,7 @@ class BranchCurve:
         lengths = np.array([piece.arc.length for piece in run])
         points = [run[0].a, *(piece.b for piece in run)]
         values = _steps(points, lengths) if name == "step" else np.array([self.value(point, name) for point in points])
-        slopes = _slopes(values, lengths)
+        slopes = slopes_of(values, lengths)
         return list(zip(values[:-1], values[1:], slopes[:-1], slopes[1:], strict=True))
 
     # --- where it takes a value
@@ -456,7 +456,7 @@ def _polygon(ends: Sequence[_Ends], scale: Array, length: float) -> Array:
     return line
 
 
-def _slopes(values: Array, lengths: Array) -> Array:
+def slopes_of(values: Array, lengths: Array) -> Array:
     """Slopes of parabolas through three neighbours each; at the ends of those through the first three and the last three."""
     chords = np.diff(values) / lengths
     if len(lengths) == 1:

@@ -20,7 +20,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, second_derivatives, shape_functions
+from .elements import gauss_points, lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -113,12 +113,17 @@ class Space(Numbering):
         value, slope = shape_functions(self.degree, xi)
         if not self.nodal:
             return value, slope
-        at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
-        return value @ at_nodes, slope @ at_nodes
+        return value @ self._at_nodes, slope @ self._at_nodes
 
     def second_derivatives(self, xi: Array) -> Array:
         """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
-        return second_derivatives(self.degree, xi)
+        second = second_derivatives(self.degree, xi)
+        return second @ self._at_nodes if self.nodal else second
+
+    @property
+    def _at_nodes(self) -> Array:
+        """Coefficients of the hierarchical functions in those that are 1 at one node."""
+        return np.asarray(np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0]))
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
@@ -364,7 +369,7 @@ class Space(Numbering):
         if self.n_elements == 1 or self.degree > _RECOVERED:
             _, u_s, _, w_s = self.displacement(x, s)
             return u_s, w_s
-        gauss = (np.polynomial.legendre.leggauss(self.degree)[0] + 1) / 2
+        gauss = gauss_points(self.degree)
         ends, size = self.ends, self.sizes
         n_local = self.degree + 1
         slope = self.shape_functions(gauss)[1]

@@ -94,13 +94,19 @@ class Evaluation:
     def negative(self) -> int:
         """Number of negative eigenvalues of E'' - P V'': counted once, as two neighbouring steps of a branch ask for it."""
         if self._negative is None:
-            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, self.spring, 1.0)
+            spring = None if self.spring is None else self.reduced(self.spring)
+            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, spring, 1.0)
         return self._negative
 
     def factors(self) -> Factor:
         """Factors of E'' - P V''."""
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
+
+    @property
+    def raw(self) -> Evaluation:
+        """The same state with what bodies take: this one, unless they hold nodes."""
+        return self
 
     def carried(self, v: Array) -> Array:
         """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
@@ -129,6 +135,10 @@ class Evaluation:
     def expanded(self, v: Array) -> Array:
         """The displacement of a vector in the unknowns of :attr:`band`."""
         return v
+
+    def reduced_form(self, band: Array, half_bandwidth: int) -> Array:
+        """Another symmetric band matrix in the unknowns of :attr:`band`."""
+        return band
 
     def reduced_mass(self, mass: Array) -> Array:
         """A mass matrix in the unknowns of :attr:`band`."""

@@ -61,6 +61,8 @@ class Potential(PointTerms):
     #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
     obstacles: tuple[Obstacle, ...] = ()
     unsettled = False
+    #: ends of elements that stand at borders of contact, and their places
+    borders: tuple[tuple[int, float], ...] = ()
     #: a potential with the same expressions on other points
     _like: Potential | None = None
     symbols: tuple[ca.SX, ca.SX, ca.SX]
@@ -125,9 +127,13 @@ class Potential(PointTerms):
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
 
-    def placed(self, x: Array) -> Array:
-        """A state with the nodes that bodies hold moved onto them."""
+    def placed(self, x: Array, factor: float = 1.0) -> Array:
+        """A state with the nodes that bodies hold moved onto them. ``factor`` as in :meth:`evaluate`."""
         return x
+
+    def by_itself(self, factor: float) -> tuple[Potential, float]:
+        """The potential that a minimiser takes, and its factor: this one, but for a family whose constraints change with its number."""
+        return self, factor
 
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""

@@ -100,7 +100,7 @@ class BranchPoint:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
         state, n = self.state, len(self.state.x)
         space, tangent = state.evaluation.potential.space, self.tangent if self.own is None else self.own
-        return controlled.rate(space, state.pressure, state.evaluation, tangent[:n], float(tangent[n]))
+        return controlled.rate(space, state.pressure, state.evaluation.raw, tangent[:n], float(tangent[n]))
 
 
 Point = TypeVar("Point", bound=BranchPoint)

@@ -159,7 +159,7 @@ class Equations:
     def stand_at(self, x: Array, pressure: float) -> None:
         """Go to another state; the factors stay those of the state before."""
         potential = self.potential
-        self.x = x = potential.placed(x)
+        self.x = x = potential.placed(x, self.magnetic)
         self.pressure = pressure
         self.evaluation = evaluation = potential.evaluate(x, pressure, self.magnetic)
         self.gap, self._row, self._corner = self.control.equation(potential.space, x, pressure, evaluation)
@@ -245,7 +245,7 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float) -> float:
     # a component that is zero but for round-off, as along a tube that widens alone, has no size of its own
     units = [unit if unit > NEGLIGIBLE * max(units) else max(units) for unit in units]
     while length > 1e-4:
-        x, pressure = potential.placed(equations.x + length * dx), equations.pressure + length * dp
+        x, pressure = potential.placed(equations.x + length * dx, equations.magnetic), equations.pressure + length * dp
         new = potential.evaluate(x, pressure, equations.magnetic)
         unbalanced = new.unbalanced
         if max(potential.largest(unbalanced)) < np.inf:

@@ -114,8 +114,7 @@ def march(
 def _through_source(potential: Potential, before: State, after: State, parameter: str) -> bool:
     """Whether the membrane went through a source on a step; while sources are turned on nobody asks."""
     if parameter == "number" and isinstance(potential, Family):
-        member = potential.member
-        return member(after.evaluation.factor).came_through_source(after.x, member(before.evaluation.factor), before.x)
+        return potential.came_through_source(after.evaluation.factor, after.x, before.evaluation.factor, before.x)
     return parameter == "load" and bool(after.evaluation.factor) and potential.passed_source(before.x, after.x)
 
 
@@ -140,11 +139,16 @@ def _carried_slope(potential: Potential, state: State, control: Control, paramet
 def _slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> tuple[Array, float]:
     """Derivative of (x, P) with respect to the parameter."""
     space, evaluation = potential.space, state.evaluation
-    _, row, corner = control.equation(space, state.x, state.pressure, evaluation)
+    _, row, corner = control.equation(space, evaluation.x, state.pressure, evaluation)
     bordered = evaluation.border(row, corner)
     if parameter == "load":
         return bordered.solve(np.zeros(len(state.x)), 1.0)  # N = (quantity - load)
     if parameter == "number" and isinstance(potential, Family):
-        rate = control_rate(potential, control, state.x, state.pressure, evaluation)
-        return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)
+        rate = control_rate(potential, control, evaluation.x, state.pressure, evaluation)
+        force, shift = potential.number_rates(evaluation, state.pressure)
+        if shift is None:
+            return bordered.solve(-force, -rate)
+        row = control.equation(space, evaluation.x, state.pressure, evaluation.raw)[1]
+        dx, dp = bordered.solve(-force, -rate - float(row @ shift))
+        return dx + shift, dp
     return bordered.solve(-evaluation.potential.factor_derivative(evaluation, state.pressure, value), 0.0)

@@ -93,8 +93,11 @@ def axisymmetric_pencil(
     band, mass, kd = evaluation.band, evaluation.reduced_mass(potential.mass), potential.space.half_bandwidth
     constraint = None if constraint is None else evaluation.reduced(constraint)
     if bending is not None:
-        band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
-    return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, evaluation.spring)
+        wide = bending.half_bandwidth
+        band = widened(band, kd, wide) + evaluation.reduced_form(bending.band, wide)
+        mass, kd = widened(mass, kd, wide), wide
+    spring = None if evaluation.spring is None else evaluation.reduced(evaluation.spring)
+    return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, spring)
 
 
 def unbounded_below(potential: Potential, evaluation: Evaluation, bending: Bending | None) -> IllPosed | None:

@@ -188,3 +188,19 @@ def _carried(eq: fm.Equilibrium, scene: fm.Scene) -> np.ndarray:
     from femmembrane.solve.finer_space import transferred
 
     return transferred(eq.potential.space, eq.state, potential_of(scene).space)
+
+
+def test_files_keep_both_borders(tmp_path):
+    scene = sliding(12, 3, follow_zones=True)
+    branch = fm.inflate(scene, volumes=[0.7, known().volume])
+    assert branch[-1].on_branch.contact.radius == pytest.approx(0.2, abs=1e-3)
+    branch.save(tmp_path / "branch.nc")
+    again = fm.load(tmp_path / "branch.nc")
+    for eq, loaded in zip(branch, again, strict=True):
+        assert loaded.scene == eq.scene
+        assert np.array_equal(loaded.state, eq.state)
+        assert loaded.contact.touching == eq.contact.touching
+    for name in ("pressure", "contact_radius", "contact_force"):
+        np.testing.assert_array_equal(again.column(name), branch.column(name))
+    assert again[-1].zones("mechanical").borders == branch[-1].zones("mechanical").borders
+    assert again[-1].of_branch.contact.radius == branch[-1].of_branch.contact.radius

@@ -24,8 +24,7 @@ from .outcome import (
     fail,
     not_written,
     refused,
-    say,
-    written_in_words,
+    succeed,
 )
 from .progress import observer
 from .report import write as write_report
@@ -118,8 +117,7 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    say(written_in_words(f"{count(len(branch))}, ", written))
-    return DONE
+    return succeed(count(len(branch)), written)
 
 
 def _ended(scene: Scene, out: Path) -> int | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor, SpringFactor
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Factor, Step
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Answer, Array, Border, Elements, Factor, Step
 
 if TYPE_CHECKING:
     from .potential import Potential
@@ -39,23 +39,17 @@ class Evaluation:
     def __init__(
         self,
         x: Array,
-        elastic_energy: float,
-        magnetic_energy: float,
-        volume: float,
-        finite: bool,
-        forces: Array,
-        densities: Array,
+        answer: Answer,
         potential: Potential,
         elements: Elements,
         factor: float,
         spring: Array | None = None,
     ) -> None:
-        self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
-        self.spring = spring
+        self.x, self.potential, self.elements, self.factor, self.spring = x, potential, elements, factor, spring
+        self.elastic_energy, self.magnetic_energy, self.volume, self.finite, self._forces, self._densities = answer
         self._band: Array | None = None
         self._negative: int | None = None
-        self._known: dict[str, float] | None = None
+        self._known: dict[str, float] = {}
 
     @property
     def force_density(self) -> Array:
@@ -87,12 +81,9 @@ class Evaluation:
     def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
         """A number that belongs to this state, computed when first asked for under its name."""
         known = self._known
-        if known is None:
-            known = self._known = {}
-        value = known.get(name)
-        if value is None:
-            value = known[name] = compute(self)
-        return value
+        if name not in known:
+            known[name] = compute(self)
+        return known[name]
 
     @property
     def band(self) -> Array:
@@ -115,6 +106,11 @@ class Evaluation:
         """Factors of E'' - P V''."""
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
+
+    @property
+    def raw(self) -> Evaluation:
+        """The same state with what bodies take: this one, unless they hold nodes."""
+        return self
 
     def carried(self, v: Array) -> Array:
         """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""

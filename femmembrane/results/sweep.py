@@ -64,6 +64,13 @@ class Sweep:
         return "\n".join([*lines, *numbered_in_words(self._dataset)])
 
     @property
+    def summary(self) -> str:
+        """How many scenes there are and how they ended, in a line."""
+        statuses, counts = np.unique(self._dataset["status"].values, return_counts=True)
+        ended = ", ".join(f"{count} {status}" for status, count in zip(statuses, counts, strict=True))
+        return f"{len(self)} scene{'s' if len(self) > 1 else ''} ({ended})"
+
+    @property
     def failed(self) -> int:
         """Number of scenes without a result; the reasons are in ``status`` and ``message``."""
         return int((~self._dataset["has_result"].values).sum())
@@ -123,9 +130,9 @@ class Sweep:
         ax : matplotlib Axes, optional
             Where to draw one variable, the first of ``show``; the answer is then these axes.
         show : sequence of str, optional
-            Variables of the data set. Of special points ``limit_pressure#2`` is the one with this number in all scenes, and ``limit_pressure.1``
-            the second of each branch; over one key ``limit_pressure`` shows all. Other variables with several values a scene are named with a
-            place, as ``pressure.0``. Default: the most telling variables of the quantity.
+            Variables of the data set. Of special points ``limit_pressure#2`` is the one with this number in all scenes, and
+            ``limit_pressure.1`` the second of each branch; over one key ``limit_pressure`` shows all. Other variables with several values
+            a scene are named with a place, as ``pressure.0``. Default: the most telling variables of the quantity.
         units : {"scaled", "si"}
             Of volumes, pressures and heights: those of the package, or SI units by the scales.
 

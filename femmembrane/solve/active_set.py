@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import numpy as np
 
 from ..errors import Status
-from ..physics.loads import over_projection
 from ..potential import Array, Potential
 from .controls import ArcLengthControl, CarriedArcLength, Control
 
@@ -139,6 +138,7 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
     # other zones, of a node or two, stay as sets of nodes
     loose = evaluation.held & ~_within(root, own)
     spent, x, pressure = result.iterations, result.x, result.pressure
+    tried: list[list[Border]] = []
     for _ in range(_MOST_PASSES):
         borders = _assigned(root, own, places)
         if borders is None:
@@ -154,8 +154,10 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
         following = potential.judged(evaluation._raw, evaluation.gaps, result.pressure) & ~_within(root, own, _NEXT * root.space.degree)
         again = _assigned(root, own, places)
         same = again is None or all(a == b or _between(root, a, b, s) for a, b, s in zip(again, borders, places, strict=True))
-        if same and (following == loose).all():
+        # on a coarse mesh each of two ends may say that the border belongs to the other one
+        if (same or again in tried) and (following == loose).all():
             return result if _in_place(evaluation) else None
+        tried.append(borders)
         x, pressure, loose = evaluation.carried(result.x), result.pressure, following
     return None
 
@@ -349,7 +351,7 @@ def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure
     space = potential.space
     rho, eta = space.end_position(evaluation.x, border.end)
     turn = 2 * np.pi * space.side * (-1.0 if border.before else 1.0)  # the element beyond the border begins, or ends, there
-    load = evaluation.factor * float(over_projection(potential.loads, np.array(eta))[0]) if potential.loads else 0.0
+    load = potential.edge_load(evaluation, eta)
     if space.lids:
         return turn * load * rho, turn * pressure * rho**2 / 2
     return turn * (load - pressure * eta) * rho, 0.0
@@ -401,5 +403,5 @@ def _pressed(evaluation: Any, body: int) -> float:
     held = evaluation.held & own
     if held.any():
         return float(np.abs(evaluation.forces[held]).sum())
-    rho, eta = evaluation.potential.positions(evaluation.x)
-    return -float(evaluation.potential.obstacles[body].gap(rho, eta).min())
+    potential, factor = evaluation.potential, evaluation.factor
+    return -float(potential.bodies_at(factor)[body].gap(*potential.positions(evaluation.x, factor)).min())

@@ -84,12 +84,15 @@ class BranchPoint:
     dual: Array
     sigma: float
     own: Array | None = field(default=None, kw_only=True)
-    #: rates that were asked for, as two segments ask for those of the point between them
+    #: values and rates that were asked for, as two segments ask for those of the point between them
+    _values: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
     _rates: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def value(self, quantity: Followed) -> float:
         """A quantity of the curve: volume, pressure or center_height by its name, or the amount of a gas."""
-        return self.state.value_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        if quantity not in self._values:
+            self._values[quantity] = self.state.value_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        return self._values[quantity]
 
     def rate(self, quantity: Followed) -> float:
         """Derivative of a quantity with respect to arc length: zero at a fold in that quantity."""
@@ -101,7 +104,7 @@ class BranchPoint:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
         state, n = self.state, len(self.state.x)
         space, tangent = state.evaluation.potential.space, self.tangent if self.own is None else self.own
-        return controlled.rate(space, state.pressure, state.evaluation, tangent[:n], float(tangent[n]))
+        return controlled.rate(space, state.pressure, state.evaluation.raw, tangent[:n], float(tangent[n]))
 
 
 Point = TypeVar("Point", bound=BranchPoint)

@@ -30,8 +30,8 @@ class FoldProblem(NumberProblem):
         super().__init__(family, scale, bounds)
         self.kind = kind
 
-    def at(self, z: Array, borders: Borders) -> Equations:
-        return (_LimitPoint if self.kind == "limit_point" else _VolumeFold)(self, z, borders)
+    def at(self, z: Array, borders: Borders, family: Family | None = None) -> Equations:
+        return (_LimitPoint if self.kind == "limit_point" else _VolumeFold)(self, z, borders, family)
 
     def first_borders(self, z: Array, sweeps: int = 6) -> Borders:
         """Modes of K and of the singular matrix closest to zero, by inverse iteration from the shape of the volume gradient."""

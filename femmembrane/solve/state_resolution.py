@@ -193,7 +193,7 @@ def largest_kink(potential: Potential, x: Array) -> float:
 
 def _kinks(potential: Potential, x: Array) -> Array:
     """:meth:`.Space.kinks`, without those at poles of a sheet magnetised along its meridians: its cone is that of the membrane."""
-    kinks = potential.space.kinks(x)
+    kinks = potential.elements.kinks(potential.space, x)
     if potential.magnetisation is not None and potential.magnetisation.meridional:
         kinks[potential.space.n_elements - 1 :] = 0.0
     return kinks

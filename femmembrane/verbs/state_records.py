@@ -11,7 +11,7 @@ import numpy as np
 from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
 from ..errors import InputError, SolveError, Status
-from ..potential import Potential
+from ..potential import ContactFamily, Potential
 from ..results.analyses import asked
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium, recorded
@@ -66,7 +66,8 @@ def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> Sta
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     if potential.obstacles:
-        potential = kept.potential
+        borders = kept.scene.borders
+        potential = potential.bordered(borders) if isinstance(potential, ContactFamily) else kept.potential
     evaluation = potential.evaluate(kept.state, kept.pressure, number)
     force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
     residual = relative_residual(potential, force, evaluation, kept.pressure)

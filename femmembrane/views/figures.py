@@ -7,7 +7,9 @@ the figures read the same in grey.
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -20,6 +22,7 @@ from ..files import replace_file
 from .backend import drawing, load, title_text
 from .journal import fit, layout
 from .labels import covered, settle
+from .tex import tex_texts
 from .zones import zone_order
 
 if TYPE_CHECKING:
@@ -195,7 +198,7 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
 
     The suffix must be a format that Matplotlib writes.
 
-    Text in SVG and PDF files stays text, which programs for drawing can edit.
+    Text in SVG and PDF files stays text, which programs for drawing can edit. In PGF files it is set by the document that reads them.
     """
     fit(figure)
     settle(figure)
@@ -207,13 +210,20 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
             )
         from matplotlib import rc_context, rcParams
 
-        with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT):
+        for_tex = Path(path).suffix.lower() == ".pgf"
+        with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT), tex_texts(figure) if for_tex else nullcontext():
             try:
                 figure.savefig(temporary, dpi=_DPI if rcParams["savefig.dpi"] == "figure" else rcParams["savefig.dpi"])
             except (RuntimeError, FileNotFoundError) as error:
-                if Path(path).suffix.lower() != ".pgf":
+                if not for_tex:
                     raise
-                raise InputError("path", str(path), "LaTeX is needed for PGF (xelatex on the search path)") from error
+                program = rcParams["pgf.texsystem"]
+                raise InputError("path", str(path), f"LaTeX is needed for PGF ({program} on the search path)") from error
+            except ValueError as error:
+                said = re.search(r"^! (.*)", str(error), re.MULTILINE)
+                if not for_tex or said is None:
+                    raise
+                raise InputError("path", str(path), f"PGF is written with the help of LaTeX, which says: {said[1]}") from error
     return figure
 
 

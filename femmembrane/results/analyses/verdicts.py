@@ -46,8 +46,8 @@ class Verdicts(EquilibriumAnalysis):
             guess = None if before is None or p.azimuthal == ALL else _verdict(before, p).coefficients
             enclosed = equilibrium.enclosed if p.control == "gas" else None
             compliance = enclosed.compliance(equilibrium.volume) if enclosed else None
-            ask = partial(door.checked_verdict, potential, *state, p.control, p.azimuthal, guess=guess, compliance=compliance)
-            equilibrium.remembered(("verdict", p.control, p.azimuthal), ask)
+            verdict = door.checked_verdict()(potential, *state, p.control, p.azimuthal, guess=guess, compliance=compliance)
+            equilibrium.remember(("verdict", p.control, p.azimuthal), verdict)
 
     # --- tables
 

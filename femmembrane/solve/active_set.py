@@ -44,6 +44,8 @@ _FEWEST = 2
 _MOST_PASSES, _NEXT = 8, 2
 #: how far beyond the middle between two ends a border may be, over the size of an element, before the other one follows it
 _BEYOND = 0.02
+#: relative difference of curvatures that are the same
+_SAME_CURVATURE = 1e-6
 #: forces that pull, over the largest, and gaps inside a body, over the size of the membrane, that a border in its place may leave
 _PULL, _INSIDE = 1e-3, 1e-6
 
@@ -128,7 +130,8 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
     """The equilibrium with ends of elements at the borders of contact; None where there are none that ends could follow."""
     evaluation = cast("ContactEvaluation", result.evaluation)
     zones = [(zone, np.array(_estimates(root, evaluation, zone))) for zone in zones_of(root, evaluation.held)]
-    followed = [(zone, places) for zone, places in zones if places.size and _assigned(root, [zone], places) is not None]
+    zones = [(zone, places) for zone, places in zones if places.size and _smooth_about(root, evaluation, zone)]
+    followed = [(zone, places) for zone, places in zones if _assigned(root, [zone], places) is not None]
     if not followed or _assigned(root, [z for z, _ in followed], np.concatenate([s for _, s in followed])) is None:
         return None
     own, places = [zone for zone, _ in followed], np.concatenate([s for _, s in followed])
@@ -180,6 +183,21 @@ def _sides(root: ContactPotential, zone: tuple[int, int]) -> list[bool]:
     """The borders of a zone: False for that at its beginning, True for that at its end; an end of the meridian is none."""
     known = set(root.nodes.tolist())
     return [side for side, beyond in ((False, zone[0] - 1), (True, zone[1] + 1)) if beyond in known]
+
+
+def _smooth_about(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> bool:
+    """Whether bodies have one curvature about each border of a zone. Where it jumps inside an element, as at the end of a rounded edge, the
+    error of the mesh depends on where the ends are: a border that they follow would follow that error.
+    """
+    gaps, reach = evaluation.gaps, root.space.degree
+    for side in _sides(root, zone):
+        edge = zone[1] if side else zone[0]
+        near = np.abs(root.nodes - edge) <= reach
+        curvature = gaps.curvature[near] / (1 - gaps.gap[near] * gaps.curvature[near])  # that of the body itself
+        size = float(np.abs(curvature).max())
+        if float(np.ptp(curvature)) > _SAME_CURVATURE * size:
+            return False
+    return True
 
 
 def _estimates(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> list[float]:

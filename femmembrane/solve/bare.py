@@ -16,7 +16,7 @@ from .homotopy import Held, follow_homotopy
 from .newton import correct
 from .state import State, flat_state
 from .stepping import march
-from .ways import CORRECTIONS, along, from_guess, sound, well_posed
+from .ways import CORRECTIONS, along, caught, from_guess, sound, well_posed
 from .wellposed import is_slack
 
 if TYPE_CHECKING:
@@ -147,7 +147,15 @@ def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
     if result.status is not Status.CONVERGED:
         raise SolveError(f"the membrane that touches no body at V = {first:.6g} was not found again", status=result.status)
     found = State.of(result, state.iterations)
-    return found if first == volume else march(potential, found, VolumeControl, first, volume, magnetic=0.0)[-1]
+    if first == volume:
+        return found
+    try:
+        return march(potential, found, VolumeControl, first, volume, magnetic=0.0)[-1]
+    except SolveError as error:
+        landed = caught(potential, VolumeControl(volume), ((error.result or [found])[-1],), magnetic=0.0)
+        if landed is None:
+            raise
+        return landed
 
 
 def _off_bodies(potential: ContactPotential, state: State) -> State | None:

@@ -17,6 +17,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
+from .contact import coarse_at_edge
 from .controls import CONTROLS, Controlled
 from .newton import TOLERANCE
 from .state import Predictor, State
@@ -29,6 +30,9 @@ ROUND_OFF = 1e-14
 _BOTH_ENDS = 10.0
 #: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
 _MOVING = 0.02
+#: distance between the branches of two meshes with other ends at the borders of contact, relative to the size of a point: where one end
+#: takes over from another, the errors of the mesh change at once, and no shorter step makes that less
+_OTHER_ENDS = 1e-3
 
 
 @dataclass(frozen=True)
@@ -234,6 +238,8 @@ def trace_points(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> 
             tracer.step /= 2
             if tracer.step < max(control.smallest, ROUND_OFF * abs(point.sigma)):  # no shorter one could be told from none
                 message = f"no step longer than {control.smallest:g} converges from {problem.place(point)}"
+                if reason := coarse_at_edge(point.state.evaluation):
+                    raise SolveError(f"{message}: {reason}", status=Status.NOT_RESOLVED)
                 raise SolveError(message, status=Status.STEP_UNDERFLOW)
         new.state.iterations = spent
         tracer.known = new.state.correction
@@ -256,7 +262,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
     if new.own is not None:
-        miss = max(miss - _MOVING, 0.0)
+        other = _OTHER_ENDS * problem.norm(new.z) / length if _followers(point) != _followers(new) else 0.0
+        miss = max(miss - _MOVING - other, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)
@@ -267,3 +274,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     half = angle / 2
     new.sigma = point.sigma + chord * (half / math.sin(half) if half else 1.0)  # of the circle through both points with these tangents
     return new, iterations, min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))
+
+
+def _followers(point: BranchPoint) -> tuple[int, ...]:
+    """The ends of elements that stand at borders of contact."""
+    return tuple(end for end, _ in point.state.evaluation.potential.scene.borders)

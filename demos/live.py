@@ -1,9 +1,9 @@
 """What one redraw of the live explorer costs on this machine, by what it consists of, at several accuracies.
 
 While a slider moves, `femmembrane explore SCENE.toml --live` traces the whole branch anew with both verdicts and sends its curve to the
-browser. Rows are medians over several values of the strength of the dipole, taken in turn, in milliseconds of one processor: of the branch with
-verdicts and its error, of the curve and the numbers that the page shows, and of their text. The browser takes about 10 ms more to draw
-them, and 25 ms where the axes change.
+browser. Rows are medians over several values of the strength of the dipole, taken in turn, in milliseconds of one processor: of the
+branch with verdicts and its error, of the curve and the numbers that the page shows, and of their text. The browser takes about 30 ms
+more.
 
     python demos/live.py            five seconds
     python demos/live.py --repeat 31   steadier medians
@@ -17,6 +17,7 @@ import statistics
 import sys
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import femmembrane as fm
@@ -35,7 +36,7 @@ def redraw(live: LiveScene, strength: float, elements: int) -> tuple[list[float]
     clocks.append(time.process_time())
     json.dumps(data, separators=(",", ":")).encode()
     clocks.append(time.process_time())
-    return [1e3 * (b - a) for a, b in zip(clocks, clocks[1:], strict=False)], answer.error, len(answer.branch)
+    return [1e3 * (b - a) for a, b in pairwise(clocks)], answer.error, len(answer.branch)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

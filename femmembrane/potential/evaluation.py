@@ -31,10 +31,8 @@ class Evaluation:
         a, where the second derivatives are the band plus a a^T: with a total charge, which couples all points.
     """
 
-    __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
-        *("potential", "elements", "factor", "spring", "_forces", "_densities", "_band", "_negative", "_known"),
-    )
+    _band: Array | None = None
+    _negative: int | None = None
 
     def __init__(
         self,
@@ -47,8 +45,6 @@ class Evaluation:
     ) -> None:
         self.x, self.potential, self.elements, self.factor, self.spring = x, potential, elements, factor, spring
         self.elastic_energy, self.magnetic_energy, self.volume, self.finite, self._forces, self._densities = answer
-        self._band: Array | None = None
-        self._negative: int | None = None
         self._known: dict[str, float] = {}
 
     @property

@@ -145,7 +145,7 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     _, row, corner = control.equation(space, evaluation.x, state.pressure, evaluation)
     bordered = evaluation.border(row, corner)
     if parameter == "load":
-        return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
+        return bordered.solve(np.zeros(len(state.x)), 1.0)  # N = (quantity - load)
     if parameter == "number" and isinstance(potential, Family):
         rate = control_rate(potential, control, evaluation.x, state.pressure, evaluation)
         force, shift = potential.number_rates(evaluation, state.pressure)

@@ -74,13 +74,13 @@ def run(
     from ..quantities import Units
     from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
     from ..results.output import SURFACES_FOLDER, run_files
-    from ..scene.absurd_loads import remarks_on_loads
+    from ..scene.absurd_loads import remarks_on_loads, remarks_on_scales
 
     system = units_of(scene, changes, units)
     Units.of(system, asked.converter)
     if explore:
         check_explorer()
-    for remark in remarks_on_loads(asked):
+    for remark in (*remarks_on_scales(asked.scales), *remarks_on_loads(asked)):
         fail(DONE, remark)
 
     with working(out, (*run_files(), NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:

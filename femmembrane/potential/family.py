@@ -219,6 +219,10 @@ class Family(Potential):
             return 0.0
         return float(self._number_rows(x, 0.0, number)[4].sum())
 
+    def fold_rates(self, evaluation: Evaluation, pressure: float, mode: Array, q: float) -> tuple[FoldDerivatives, Array | None]:
+        """:meth:`fold_derivatives` at a state, and how bodies that hold nodes move these with the number; None where none does."""
+        return self.fold_derivatives(evaluation.x, pressure, evaluation.factor, mode, q), None
+
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
         if self.charged is not None:

@@ -130,6 +130,9 @@ class Equations:
     def linearise(self) -> None:
         raise NotImplementedError
 
+    def let_go(self) -> None:
+        """Let the borders of contact move with the state from here on: corrections leave them in their places, and rates do not."""
+
     def jacobian(self, row: Array) -> WideBorder:
         """Of (R, g, row . z) with respect to (x, P, m), without what bodies do to x."""
         rows = [self.gap_row, row]
@@ -248,6 +251,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
         """Of the derivatives of R, g and the arc length: det [K, b; b^T, 0] = -(b . K^-1 b) det K, and the dense part of the border."""
         equations = self._there(point.state.evaluation, point.z, point.borders)
         equations.factorise()
+        equations.let_go()
         deflated = equations.factor.determinant_sign() * (1 if equations.null_gap > 0 else -1)  # the gap is -1/(b . K^-1 b)
         return deflated * equations.jacobian(equations.row(point.dual)).determinant_sign()
 
@@ -341,7 +345,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
                 abs(change[-1]) / max(self.scale, abs(z[-1])),
             )
             if size <= tolerance:
-                return _Corrected(iteration, equations, jacobian, float(size))
+                return _Corrected(iteration, equations, row, float(size))
             if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * tolerance):
                 return _Corrected(iteration)
             previous = size
@@ -373,12 +377,13 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return replace(known[id(result.evaluation)], iterations=result.iterations)
 
     def _point(self, found: _Corrected, orientation: Array) -> NumberPoint:
-        equations, jacobian = cast("Equations", found.last), cast("WideBorder", found.jacobian)
+        equations, row = cast("Equations", found.last), cast("Array", found.row)
+        equations.let_go()
         evaluation, pressure = equations.evaluation, equations.pressure
         residual = relative_residual(equations.family, equations.force, evaluation, pressure)
         z = equations.carried(equations.z)
         state = State(z[:-2], pressure, evaluation, found.iterations, found.correction, residual, gap=0.0, _factor=equations.factor)
-        own = equations.whole(*jacobian.solve(None, [0.0, 1.0]))
+        own = equations.whole(*equations.jacobian(row).solve(None, [0.0, 1.0]))
         tangent = equations.carried(own)
         length = self.norm(tangent)
         if orientation @ tangent < 0:
@@ -390,11 +395,11 @@ class NumberProblem(CurveProblem[NumberPoint]):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Corrected:
-    """Where Newton's method ended: the last equations with their derivatives, None where it did not converge."""
+    """Where Newton's method ended: the last equations with the row of the last one, None where it did not converge."""
 
     iterations: int
     last: Equations | None = None
-    jacobian: WideBorder | None = None
+    row: Array | None = None
     correction: float = math.inf
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Family, Potential
+from .contact import coarse_at_edge
 from .controls import CenterHeightControl, Control, Gas, GasOver, VolumeControl
 from .newton import NewtonResult, correct
 from .state import Predictor, State, distance, joined
@@ -107,6 +108,8 @@ def march(
                 bad = None if parameter == "magnetic" else apparent(potential, accepted[-1].evaluation)
                 if bad is not None:
                     raise SolveError(f"{message}: {bad}", status=bad.status, result=accepted)
+                if reason := coarse_at_edge(accepted[-1].evaluation):
+                    raise SolveError(f"{message}: {reason}", status=Status.NOT_RESOLVED, result=accepted)
                 raise SolveError(message, status=Status.STEP_UNDERFLOW, result=accepted)
     return accepted[1:]
 

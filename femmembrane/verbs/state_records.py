@@ -130,7 +130,7 @@ def record_on_borders(
     own = found.state.evaluation.potential
     moved = found.scene.bordered(own.scene.borders) if own.obstacles else found.scene
     new = record(moved, own, found.state, previous, clock, gas)
-    there = potential, state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    there = potential, state.evaluation.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
     store(new, on_branch=recorded(scene, *there))
     return new
 

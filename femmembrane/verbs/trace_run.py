@@ -310,6 +310,8 @@ class TraceRun(Run[Branch]):
         try:
             return self._step()
         except SolveError as error:
+            if error.status is Status.NOT_RESOLVED:
+                return error.status, str(error)
             near = self.potential_at(self.point).distance_to_sources(self.point.state.x)
             return stopped_by_source(error, near, self.potential.space.unit) or (error.status, str(error))
 

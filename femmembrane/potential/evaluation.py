@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor, SpringFactor
@@ -119,6 +120,10 @@ class Evaluation:
     def row(self, row: Array) -> Array:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row
+
+    def pressed_flat(self) -> NDArray[np.bool_] | None:
+        """Which elements lie on a body all over, shape (n_elements,), so that no short wave lifts them; None where none does."""
+        return None
 
     def released(self) -> Evaluation | None:
         """The same state without the nodes that bodies hold by no force; None where there are none."""

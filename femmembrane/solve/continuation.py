@@ -13,7 +13,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar, cast
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
@@ -21,6 +21,9 @@ from .contact import coarse_at_edge
 from .controls import CONTROLS, Controlled
 from .newton import TOLERANCE
 from .state import Predictor, State
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactEvaluation, ContactPotential
 
 #: steps so many times the smallest that turn on the spot have met a corner
 CORNER = 100.0
@@ -30,9 +33,9 @@ ROUND_OFF = 1e-14
 _BOTH_ENDS = 10.0
 #: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
 _MOVING = 0.02
-#: distance between the branches of two meshes with other ends at the borders of contact, relative to the size of a point: where one end
-#: takes over from another, the errors of the mesh change at once, and no shorter step makes that less
-_OTHER_ENDS = 1e-3
+#: how far a point may be from its prediction, relative to its size, where other nodes are held by bodies, or other ends of elements stand
+#: at the borders of contact: the errors of the mesh change at once there, and no shorter step makes that less
+_REGROUPED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -262,8 +265,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
     if new.own is not None:
-        other = _OTHER_ENDS * problem.norm(new.z) / length if _followers(point) != _followers(new) else 0.0
-        miss = max(miss - _MOVING - other, 0.0)
+        jump = 0.0 if _held_by(point) == _held_by(new) else _REGROUPED * problem.norm(new.z) / length
+        miss = max(miss - _MOVING - jump, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)
@@ -276,6 +279,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     return new, iterations, min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))
 
 
-def _followers(point: BranchPoint) -> tuple[int, ...]:
-    """The ends of elements that stand at borders of contact."""
-    return tuple(end for end, _ in point.state.evaluation.potential.scene.borders)
+def _held_by(point: BranchPoint) -> tuple[bytes, tuple[int, ...]]:
+    """The nodes that bodies hold, and the ends of elements that stand at borders of contact."""
+    evaluation = cast("ContactEvaluation", point.state.evaluation)
+    potential = cast("ContactPotential", evaluation.potential)
+    return evaluation.held.tobytes(), tuple(end for end, _ in potential.borders)

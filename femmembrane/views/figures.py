@@ -227,6 +227,20 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
     return figure
 
 
+#: colours of several curves or branches in one picture: for the colour-blind too, and of different lightness
+COLORS = ("#0072b2", "#d55e00", "#222222", "#56b4e9", "#a01040", "#e69f00", "#009e73")
+#: dashes that go with them, so many that no two curves of 28 look the same
+DASHES: tuple[Any, ...] = ("solid", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)))
+
+
+def tell_apart(axes: Axes) -> None:
+    """Let the curves that are drawn next differ in colour, in lightness and in dashes, so that they do in grey as well."""
+    from cycler import cycler
+
+    looks = [(COLORS[k % len(COLORS)], DASHES[k % len(DASHES)]) for k in range(len(COLORS) * len(DASHES))]
+    axes.set_prop_cycle(cycler(color=[color for color, _ in looks], linestyle=[dashes for _, dashes in looks]))
+
+
 def save_axes(axes: Axes, path: str | PathLike[str] | None) -> Axes:
     """Fit and write the figure of axes that somebody gave, as :func:`save_figure`, and return the axes."""
     whole = axes.get_figure(root=True)

@@ -500,7 +500,7 @@ def _between_corners(values: Array, lengths: Array) -> list[_Ends]:
 
     From there it may go as a root, as a radius of contact does: slopes are small enough for cubics not to swing beyond their ends.
     """
-    slopes, chords = _slopes(values, lengths), np.diff(values) / lengths
+    slopes, chords = slopes_of(values, lengths), np.diff(values) / lengths
     for k, own in enumerate(slopes):
         beside = chords[max(k - 1, 0) : k + 1]
         most = _STEEPEST * np.abs(beside).min()

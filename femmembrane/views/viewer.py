@@ -18,7 +18,7 @@ from ..quantities import SCALED, Units, caption, in_si, words
 from ..results.analyses import remarks
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
-from .picture import DrawnMembrane, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
+from .picture import DrawnMembrane, MovingBodies, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
 from .surroundings import Box, place_of
 
 if TYPE_CHECKING:
@@ -150,12 +150,20 @@ class _Stage:
         self.limits = min(s.range[0] for s in self.surfaces), max(s.range[1] for s in self.surfaces)
         box = Box.of([{"rho": s.rho, "eta": s.eta} for s in self.surfaces])
         self.membrane = DrawnMembrane(self.plotter, self.limits, box.size)
-        drawn = draw_surroundings(self.plotter, self.branch[0].scene, box)
+        self.bodies = None
+        scenes = [equilibrium.scene for equilibrium in self.branch]
+        if all((scene.sources, scene.obstacles) == (scenes[0].sources, scenes[0].obstacles) for scene in scenes):
+            drawn = draw_surroundings(self.plotter, scenes[0], box)
+        else:
+            self.bodies = MovingBodies(self.plotter, scenes, box)
+            drawn = self.bodies.points
         draw_key(self.plotter, self.surfaces[0], self.limits)
         aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11)
 
     def draw(self, index: int) -> None:
         self.membrane.show(self.surfaces[index])
+        if self.bodies is not None:
+            self.bodies.show(self.branch[index].scene)
         write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total, self.units))
 
 

@@ -17,7 +17,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import InputError
-from . import completion, convergence, cost, explore, export, fit, report, run, scenes, sweep, view
+from . import completion, convergence, cost, explore, export, fit, report, run, scenes, sweep, switch, view
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, drop, fail, no_room, open_streams
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
@@ -34,6 +34,7 @@ app = App(
 for command in (
     run.run,
     sweep.sweep,
+    switch.switch,
     convergence.convergence,
     cost.cost,
     fit.fit,

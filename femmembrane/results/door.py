@@ -275,6 +275,13 @@ def branch_html(branch: Branch) -> str:
     return branch_html(branch)
 
 
+def tipped_html(branch: TippedBranch) -> str:
+    """See :func:`femmembrane.views.notebook.tipped_html`."""
+    from ..views.notebook import tipped_html
+
+    return tipped_html(branch)
+
+
 def equilibrium_html(equilibrium: Equilibrium) -> str:
     """See :func:`femmembrane.views.notebook.equilibrium_html`."""
     from ..views.notebook import equilibrium_html

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,9 @@ from ..files import replace_file
 from ..quantities import axis_label
 from ..results.tipped import TippedBranch, TippedEquilibrium
 from .branch_lines import MARKERS
+from .picture import Surface, polydata
 from .plots import new_figure, save_figure
+from .surroundings import Box
 from .vtk import Revolution, write_collection
 
 if TYPE_CHECKING:
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: what the colour of a state with waves shows
+COLOR = "wave_size"
 _LINE, _GREY = "#d55e00", "#777777"
 
 
@@ -46,14 +51,72 @@ def _write_surface(equilibrium: TippedEquilibrium, file: Path, sectors: int = 96
     R, Z = space.mesh.position(space.node_parameters())
     revolution = Revolution.of(R, sectors, space.closed, space.side)
     found = equilibrium.surface(sectors)
-    column = np.mod(np.rint(np.arctan2(revolution.sine, revolution.cosine) / (2 * np.pi) * sectors).astype(int), sectors)
-    points = np.stack([found[name][revolution.node, column] for name in ("x", "y", "z")], axis=1)
+    points = np.stack([found[name][revolution.node, _columns(revolution, sectors)] for name in ("x", "y", "z")], axis=1)
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads)) if len(c)]
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     data = {"displacement": points - revolution.vectors(R, Z)}
     mesh = meshio.Mesh(points, cells, point_data=data, cell_data={n: [np.full(len(c), v) for _, c in cells] for n, v in loads.items()})
     with replace_file(file) as temporary:
         mesh.write(temporary, file_format="vtu")
+
+
+@dataclass(frozen=True, eq=False)
+class WavySurface(Surface):
+    """A state with waves around the axis as a surface; its colour shows how far they move each point.
+
+    Attributes
+    ----------
+    places : ndarray, shape (n_points, 3)
+    """
+
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @classmethod
+    def of_tipped(cls, equilibrium: TippedEquilibrium, sectors: int) -> WavySurface:
+        """The surface at the nodes of the meridian and so many angles."""
+        space = equilibrium.potential.space
+        R, _ = space.mesh.position(space.node_parameters())
+        found, revolution = equilibrium.surface(sectors), Revolution.of(R, sectors, space.closed, space.side)
+        moved = equilibrium.tipped.shape(equilibrium.state, 2 * np.pi * np.arange(sectors) / sectors)[0]
+        waves = np.sqrt(((moved - moved.mean(axis=2, keepdims=True)) ** 2).sum(axis=0))
+        at = revolution.node, _columns(revolution, sectors)
+        places = np.stack([found[name][at] for name in ("x", "y", "z")], axis=1)
+        rho = np.hypot(found["x"], found["y"]).max(axis=1)
+        return cls(equilibrium, COLOR, rho, found["z"].mean(axis=1), revolution, waves[at], places)  # type: ignore[arg-type]
+
+    @property
+    def points(self) -> Array:
+        return self.places
+
+    @property
+    def scalars(self) -> Array:
+        return self.values
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """From 0 to the largest value, apart by as much as is worth a colour."""
+        return 0.0, max(float(self.values.max()), 1e-6 * float(self.rho.max()))
+
+    @property
+    def circles(self) -> list[tuple[int, float]]:
+        """Only where the membrane is held on circles: others are none."""
+        return []
+
+    @property
+    def normals(self) -> Array:
+        mesh = polydata(self.revolution, self.places)
+        found = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False)
+        return np.asarray(found.point_data["Normals"], dtype=np.float64)
+
+    @property
+    def box(self) -> Box:
+        return Box(float(self.rho.max()), float(self.places[:, 2].min()), float(self.places[:, 2].max()))
+
+
+def _columns(revolution: Revolution, sectors: int) -> NDArray[np.int64]:
+    """Number of the angle of each point."""
+    turns = np.rint(np.arctan2(revolution.sine, revolution.cosine) / (2 * np.pi) * sectors)
+    return np.mod(turns.astype(np.int64), sectors)
 
 
 def plot_tipped(branch: TippedBranch, path: str | PathLike[str] | None, ax: Axes | None, x: str, y: str, label: str) -> Any:

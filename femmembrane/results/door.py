@@ -317,7 +317,7 @@ def error_estimate_html(estimate: ErrorEstimate) -> str:
     return error_estimate_html(estimate)
 
 
-def study_html(study: Convergence | Cost | Sweep, label: str) -> str:
+def study_html(study: Convergence | Cost | Sweep | Fit, label: str) -> str:
     """See :func:`femmembrane.views.notebook.study_html`."""
     from ..views.notebook import study_html
 

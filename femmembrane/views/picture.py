@@ -135,6 +135,16 @@ class Surface:
         return self.revolution.vectors(self.rho, self.eta)
 
     @property
+    def scalars(self) -> Array:
+        """Values at the points."""
+        return self.revolution.scalars(self.values)
+
+    @property
+    def circles(self) -> list[tuple[int, float]]:
+        """Nodes whose circles are drawn, with their thickness."""
+        return circles(self.rho, self.eta, [end % self.rho.size for end in self.equilibrium.potential.space.edges])
+
+    @property
     def normals(self) -> Array:
         """Normals of the deformed surface at the points, shape (n_points, 3)."""
         along = np.stack([np.gradient(self.rho), np.gradient(self.eta)])
@@ -249,7 +259,7 @@ class DrawnMembrane:
             first = np.concatenate([revolution.node[cells].min(axis=1) for cells in (revolution.triangles, revolution.quads)])
             self._mesh.cell_data["zone"] = surface.values[first]
         else:
-            self._mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
+            self._mesh.point_data[surface.quantity] = surface.scalars
 
     def _scale(self, surface: Surface) -> dict[str, Any]:
         if surface.quantity == "zone":
@@ -259,8 +269,7 @@ class DrawnMembrane:
     def _draw_circles(self, surface: Surface) -> None:
         import pyvista
 
-        ends = [end % surface.rho.size for end in surface.equilibrium.potential.space.edges]
-        shown = circles(surface.rho, surface.eta, ends)
+        shown = surface.circles
         points = _rings(np.array([(surface.rho[node], surface.eta[node], radius * self._size) for node, radius in shown]).reshape(-1, 3))
         if self._lines is not None and self._lines.n_points == len(points):
             self._lines.points = points

@@ -156,3 +156,15 @@ def test_many_curves_are_told_apart_in_grey_as_well() -> None:
 
 def lightness(color: str) -> float:
     return float(np.dot((0.2126, 0.7152, 0.0722), to_rgb(color)))
+
+
+def test_a_legend_takes_the_corner_that_is_free(branch: fm.Branch) -> None:
+    """Where Matplotlib's choice touches a line, another corner comes before the place below the axes."""
+    _, axes = plots.new_figure((6.4, 4.6), title="one line along two edges")
+    axes.plot([0, 0, 1], [0, 1, 1], label="a name")
+    for y in (0.0, 0.97):
+        axes.plot([0.45, 0.55], [y, y])
+    plots.draw_legend(axes)
+    legend = axes.get_legend()
+    assert axes.get_window_extent().contains(*legend.get_window_extent().min)
+    assert not figures.covers(legend, axes)

@@ -309,6 +309,14 @@ QUANTITIES: Mapping[str, Quantity] = {
     "volume_folds": Quantity("number of volume folds", words="number of volume folds"),
     "azimuthal_onsets": Quantity("number of azimuthal onsets", words="number of azimuthal onsets"),
     "onset_waves": Quantity("number of waves around the axis of the onsets"),
+    **{
+        name: text
+        for tag, points in (("limit", "limit point"), ("fold", "volume fold"), ("onset", "onset"))
+        for name, text in (
+            (f"{tag}_identity", Quantity(f"which {points} it is: the same number in all scenes, 0 of one that no scene beside surely has")),
+            (f"{tag}_cut", Quantity(f"whether the {points} has another number in a neighbouring scene, from a way round (1 or 0)")),
+        )
+    },
     "wrinkled_fraction": Quantity("part of the reference area that is wrinkled, along the branch"),
     "largest_wrinkled_fraction": Quantity(
         "largest part of the reference area that is wrinkled on the branch", label="largest wrinkled part of the area"

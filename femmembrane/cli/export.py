@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .folders import OwnScene, finished, own_of
-from .outcome import DONE, say, written_in_words
+from .outcome import succeed
 
 
 def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | None = None, own: OwnScene = None) -> int:
@@ -34,5 +34,4 @@ def export(folder: Path, /, *, to: str, step: int | None = None, out: Path | Non
         raise InputError("--out", str(out), f"a name that ends in {suffix} is allowed")
     file = out or (folder if folder.is_dir() else folder.parent) / f"export{suffix}"
     files = write(finished(folder, own=own_of(own)), file, step=step)
-    say(written_in_words("", [files[-1]]))
-    return DONE
+    return succeed("", [files[-1]])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import SolveError
 from .folders import OwnScene, System, finished, own_of
-from .outcome import DONE, NOT_CONVERGED, explain, fail
+from .outcome import DONE, NOT_CONVERGED, explain, fail, succeed
 
 
 def view(
@@ -53,4 +53,5 @@ def view(
             show(branch, color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units, on_frame=count)
     except SolveError as error:
         return fail(NOT_CONVERGED, explain(error.status, str(error)))
-    return DONE
+    written = list(filter(None, (screenshot, movie)))
+    return succeed("", written) if written else DONE

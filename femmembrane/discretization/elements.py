@@ -39,7 +39,7 @@ def meridian_order(line: skfem.MeshLine, element: skfem.Element) -> tuple[NDArra
 def shape_functions(degree: int, xi: Array) -> tuple[Array, Array]:
     """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
     xi = np.ascontiguousarray(xi, dtype=float)
-    return _shape_functions(degree, xi.tobytes()) if xi.size <= _FEW else _tabulated(degree, xi)
+    return _shape_functions(degree, xi.tobytes()) if xi.size <= _FEW else _summed(degree, xi)
 
 
 @lru_cache(maxsize=64)
@@ -56,6 +56,22 @@ def _tabulated(degree: int, xi: Array) -> tuple[Array, Array]:
     value = np.stack([t[0] for t in table], axis=1)
     slope = np.stack([t[1][0] for t in table], axis=1)
     return value, slope
+
+
+def _summed(degree: int, xi: Array) -> tuple[Array, Array]:
+    """The same at many points, as sums of Legendre polynomials."""
+    legendre = np.polynomial.legendre.legvander(2 * xi - 1, degree)
+    value, slope = _series(degree)
+    return legendre @ value, legendre @ slope
+
+
+@lru_cache(maxsize=64)
+def _series(degree: int) -> tuple[Array, Array]:
+    """Shape functions and their slopes in Legendre polynomials, a column each."""
+    points = lobatto(degree)
+    inverse = np.linalg.inv(np.polynomial.legendre.legvander(2 * points - 1, degree))
+    value, slope = shape_functions(degree, points)
+    return inverse @ value, inverse @ slope
 
 
 def second_derivatives(degree: int, xi: Array) -> Array:

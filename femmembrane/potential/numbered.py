@@ -18,8 +18,10 @@ from ..errors import InputError
 from ..kernels.interface import Array, Elements
 from ..physics.magnetisation import Magnetisation
 from ..threads import cached_property
+from .evaluation import Evaluation
 from .expressions import BUILDING, casadi_answers_numpy
-from .potential import Evaluation, Potential, potential_of, require_elements
+from .of_scene import potential_of, require_elements
+from .potential import Potential
 from .replay import Replay
 
 if TYPE_CHECKING:
@@ -245,6 +247,6 @@ class NumberedMember(Potential):
     def pole_rise(self, factor: float) -> float:
         return self.family.pole_rise_at(self.values)
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
-        return Evaluation(x, *elements.evaluate(x, pressure, magnetic, *self.values), self, elements, magnetic)
+        return Evaluation(x, elements.evaluate(x, pressure, magnetic, *self.values), self, elements, magnetic)

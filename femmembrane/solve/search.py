@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
+from .bare import moderate
 from .branch import FOLDS, BranchProblem, first_point
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, VolumeControl
@@ -18,7 +19,7 @@ from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, displaced, relative_size
 from .segment import Located, Segment
 from .special_points import branch_points, branches_crossing
-from .start import moderate, start_at_volume
+from .start import start_at_volume
 from .state import Predictor, State, at_rest, displacement, distance, flat_state
 from .state_resolution import unresolved
 from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest
@@ -187,10 +188,10 @@ class Search:
     def _deflated_newton(self, control: Control, x: Array, pressure: float, iterations: int = 40) -> State | None:
         potential = self.potential
         for _ in range(iterations):
-            equations = Equations(potential, control, x, pressure, potential.evaluate(x, pressure))
+            equations = Equations(potential, control, x, pressure)
             if not equations.finite:
                 return None
-            dx, dp = equations.newton_step()
+            dx, dp, _ = equations.newton_step()
             self.iterations += 1
             if relative_size(potential, dx, x) <= TOLERANCE**0.5:
                 result = correct(potential, control, x, pressure)

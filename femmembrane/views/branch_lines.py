@@ -41,6 +41,8 @@ MARKERS = {
     "number_fold": ("h", "limit point in the number"),
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
+    "touch": (">", "first touch of a body"),
+    "release": ("<", "last touch of a body"),
 }
 
 

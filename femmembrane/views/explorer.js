@@ -4,10 +4,11 @@ const byId = (id) => document.getElementById(id);
 const SECTORS = 48, PER_WAVE = 8, MOST_SECTORS = 960, FRAME = 50, AMPLITUDE = 0.12, OF_A_WAVE = 0.35;
 const SNAP = "#c2184e";
 const MARKERS = { limit_point: "circle", volume_fold: "square", height_fold: "triangle-up", number_fold: "hexagon",
-  branch_point: "diamond", azimuthal_onset: "triangle-down" };
+  branch_point: "diamond", azimuthal_onset: "triangle-down", touch: "triangle-right", release: "triangle-left" };
 // the same markers as polygons, for the key below the diagram
 const CORNERS = { square: "-4,-4 4,-4 4,4 -4,4", "triangle-up": "0,-5 5,4 -5,4", hexagon: "-5,0 -2.5,-4.4 2.5,-4.4 5,0 2.5,4.4 -2.5,4.4",
-  diamond: "0,-6 6,0 0,6 -6,0", "triangle-down": "0,5 5,-4 -5,-4", x: "-4,-4 4,4 0,0 4,-4 -4,4 0,0" };
+  diamond: "0,-6 6,0 0,6 -6,0", "triangle-down": "0,5 5,-4 -5,-4", "triangle-right": "5,0 -4,5 -4,-5", "triangle-left": "-5,0 4,5 4,-5",
+  x: "-4,-4 4,4 0,0 4,-4 -4,4 0,0" };
 const ZONED = "zone", night = matchMedia("(prefers-color-scheme: dark)"), calm = matchMedia("(prefers-reduced-motion: reduce)");
 let data = JSON.parse(byId("data").textContent);
 let now = 0, shown = 0, phase = 1, motion = null, playing = null, compared = [];

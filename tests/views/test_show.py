@@ -63,7 +63,7 @@ def test_a_mode_moves_and_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """From a saved branch to a picture of one step, without a word; the zones are those of the equilibrium."""
+    """From a saved branch to a picture of one step; the zones are those of the equilibrium."""
     branch().save(tmp_path / "branch.nc")
     assert main(["view", str(tmp_path), "--step", "0", "--color", "zone", "--screenshot", str(tmp_path / "a.png")]) == 0
     from matplotlib.image import imread
@@ -71,7 +71,7 @@ def test_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     image = imread(tmp_path / "a.png")[..., :3]
     assert image.shape == (900, 1200, 3)
     assert 0.1 < (image[100:, :900].min(axis=2) < 0.9).mean() < 0.9
-    assert capfd.readouterr() == ("", "")
+    assert capfd.readouterr() == (f"written: {tmp_path / 'a.png'}\n", "")
 
 
 def test_zones_are_coloured_between_their_borders() -> None:

@@ -158,13 +158,13 @@ def lightness(color: str) -> float:
     return float(np.dot((0.2126, 0.7152, 0.0722), to_rgb(color)))
 
 
-def test_a_legend_takes_the_corner_that_is_free(branch: fm.Branch) -> None:
-    """Where Matplotlib's choice touches a line, another corner comes before the place below the axes."""
-    _, axes = plots.new_figure((6.4, 4.6), title="one line along two edges")
-    axes.plot([0, 0, 1], [0, 1, 1], label="a name")
-    for y in (0.0, 0.97):
-        axes.plot([0.45, 0.55], [y, y])
+def test_a_legend_takes_the_corner_that_is_free() -> None:
+    """Matplotlib's choice, the corner above the steep part of a curve, is nearer to the curve than it may be: another one is free."""
+    _, axes = plots.new_figure((6.4, 4.6), title="a curve that levels off")
+    x = np.linspace(0.0, 10.0, 201)
+    axes.plot(x, np.tanh(x / 2.5), label="a name that is as long as a verdict")
     plots.draw_legend(axes)
-    legend = axes.get_legend()
-    assert axes.get_window_extent().contains(*legend.get_window_extent().min)
-    assert not figures.covers(legend, axes)
+    inside, box = axes.get_window_extent(), axes.get_legend().get_window_extent()
+    assert inside.contains(*box.min)
+    assert inside.contains(*box.max)
+    assert not figures.covers(axes.get_legend(), axes)

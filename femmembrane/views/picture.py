@@ -450,8 +450,8 @@ def polydata(revolution: Revolution, points: Array) -> pyvista.PolyData:
     return pyvista.PolyData(points, faces=np.concatenate(faces))
 
 
-def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18) -> None:
-    """Look from the front and a little from above, so that the points fill the picture beside the colour scale."""
+def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18, words: float = 0.0) -> None:
+    """Look from the front and a little from above, so that the points fill what words at the top and the colour scale leave."""
     toward = np.array([0.3, -1.0, 0.45])
     toward /= np.linalg.norm(toward)
     right = np.cross([0.0, 0.0, 1.0], toward)
@@ -460,9 +460,9 @@ def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: f
     x, y, depth = points @ right, points @ up, np.ptp(points @ toward) + 1.0
     aspect = plotter.window_size[0] / plotter.window_size[1]
     # height of the picture in units of the scene
-    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin)
+    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin - words)
     centre = (x.min() + x.max()) / 2 * right + (y.min() + y.max()) / 2 * up + (points @ toward).mean() * toward
-    centre = centre + bar / 2 * aspect * height * right
+    centre = centre + bar / 2 * aspect * height * right + words / 2 * height * up
     plotter.enable_parallel_projection()
     plotter.camera.focal_point, plotter.camera.up = tuple(centre), tuple(up)
     plotter.camera.position = tuple(centre + 10 * depth * toward)

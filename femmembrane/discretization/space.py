@@ -315,7 +315,7 @@ class Space(Numbering):
         ndarray, shape (n_elements - 1 + number of poles,)
             At the reference radii :attr:`kink_radii`.
         """
-        at_rest, slopes, per_length, rest_kinks, poles = self._ends_of_elements
+        at_rest, slopes, per_length, rest_kinks, poles = self.ends_of_elements
         y = slopes @ self.extend(x).take(self.gather)
         y *= per_length
         y += at_rest
@@ -340,7 +340,7 @@ class Space(Numbering):
         return np.append(self._end_positions[0, 1:-1], np.zeros(int(self.on_axis.sum())))
 
     @cached_property
-    def _ends_of_elements(self) -> tuple[Array, Array, Array, Array, list[tuple[int, int]]]:
+    def ends_of_elements(self) -> tuple[Array, Array, Array, Array, list[tuple[int, int]]]:
         """Components along and up of the tangents at both ends of each element at rest, each of shape (2, n_elements), slopes of the shape
         functions there, the factor that relates them to arc length, the kinks at rest and which ends are poles."""
         inside = 1e-9 * self.sizes  # the tangent of a curve with a corner has two values there

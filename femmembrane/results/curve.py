@@ -371,7 +371,7 @@ class BranchCurve:
         values = _steps(points, lengths) if name == "step" else np.array([self.value(point, name) for point in points])
         corners = [k for k in range(1, len(run)) if points[k].node.corner]
         if not corners:
-            slopes = _slopes(values, lengths)
+            slopes = slopes_of(values, lengths)
             return list(zip(values[:-1], values[1:], slopes[:-1], slopes[1:], strict=True))
         parts = [_between_corners(values[a : b + 1], lengths[a:b]) for a, b in pairwise([0, *corners, len(run)])]
         return [piece for part in parts for piece in part]
@@ -485,7 +485,7 @@ def _polygon(ends: Sequence[_Ends], scale: Array, length: float) -> Array:
     return line
 
 
-def _slopes(values: Array, lengths: Array) -> Array:
+def slopes_of(values: Array, lengths: Array) -> Array:
     """Slopes of parabolas through three neighbours each; at the ends of those through the first three and the last three."""
     chords = np.diff(values) / lengths
     if len(lengths) == 1:
@@ -500,7 +500,7 @@ def _between_corners(values: Array, lengths: Array) -> list[_Ends]:
 
     From there it may go as a root, as a radius of contact does: slopes are small enough for cubics not to swing beyond their ends.
     """
-    slopes, chords = _slopes(values, lengths), np.diff(values) / lengths
+    slopes, chords = slopes_of(values, lengths), np.diff(values) / lengths
     for k, own in enumerate(slopes):
         beside = chords[max(k - 1, 0) : k + 1]
         most = _STEEPEST * np.abs(beside).min()

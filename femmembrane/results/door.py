@@ -6,12 +6,13 @@ Records stand below these rooms. They go up here alone, when one of their method
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..potential import Array, Evaluation, Potential
+    from ..potential import Array, Potential
     from ..scene import Scene
     from ..solve.controls import Control, Gas
     from ..solve.sensitivity import Rates, Sensitive
@@ -50,20 +51,12 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     return profile_at(scene, x, pressure, s)
 
 
-def checked_verdict(
-    potential: Potential,
-    x: Array,
-    pressure: float,
-    evaluation: Evaluation,
-    control: str | None,
-    azimuthal: int | str,
-    guess: Array | None = None,
-    compliance: float | None = None,
-) -> Verdict:
-    """See :func:`femmembrane.stability.checked_verdict.checked_verdict`."""
+@cache
+def checked_verdict() -> Callable[..., Verdict]:
+    """:func:`femmembrane.stability.checked_verdict.checked_verdict`, looked up once, as a branch asks at every step."""
     from ..stability.checked_verdict import checked_verdict
 
-    return checked_verdict(potential, x, pressure, evaluation, control, azimuthal, guess=guess, compliance=compliance)
+    return checked_verdict
 
 
 def natural_frequencies(potential: Potential, x: Array, pressure: float, n: int, count: int, control: str) -> tuple[Vibration, ...]:

@@ -92,6 +92,9 @@ def minimize(
     status : str
         IPOPT's own return status, kept for the record.
     """
+    alone, factor = potential.by_itself(magnetic)
+    if alone is not potential:
+        potential, magnetic, evaluation = alone, factor, None
     evaluation = evaluation or potential.evaluate(x, pressure, magnetic)
     scale_u, scale_w = (float(np.abs(x[index]).max(initial=0.0)) or 1.0 for index in potential.space.fields)
     if potential.strained:  # stiff in both directions, so that one length measures both

@@ -310,6 +310,8 @@ class TraceRun(Run[Branch]):
         try:
             return self._step()
         except SolveError as error:
+            if error.status is Status.NOT_RESOLVED:
+                return error.status, str(error)
             near = self.potential_at(self.point).distance_to_sources(self.point.state.x)
             return stopped_by_source(error, near, self.potential.space.unit) or (error.status, str(error))
 
@@ -470,7 +472,8 @@ class TraceRun(Run[Branch]):
     def _add(self, point: BranchPoint, clock: float) -> None:
         with self.timed("verdicts"):
             scene, state = self.scene_of(point.state), self.own(point.state)
-            new = record_on_borders(scene, state, self.solve(point), self.found[-1] if self.found else None, clock)
+            solve: Solve = lambda onto, found: self.solve(point)(onto, found)  # noqa: E731  # hardly ever asked for
+            new = record_on_borders(scene, state, solve, self.found[-1] if self.found else None, clock)
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.request.max_steps + 1, new)

@@ -12,9 +12,8 @@ from ..quantities import PLACES, axis_label, title, words
 from ..results.branch import Branch
 from ..results.folds import FOLD_NAMES
 from . import plots
-from .branch_lines import COLORS
 from .explorer import framed
-from .figures import png
+from .figures import COLORS, png
 from .html import branch_rows, equilibrium_pairs, table
 
 if TYPE_CHECKING:

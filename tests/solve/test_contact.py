@@ -224,8 +224,6 @@ def test_between_two_equilibria_of_a_branch():
         ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Plane(0.5), fm.Ball(height=0.7, radius=0.3)])),
         ("obstacle", lambda: plate(elements=4).replace(obstacles=3)),
         ("obstacle", lambda: plate(elements=4).replace(obstacles=[3])),
-        ("effects.tension_field", lambda: plate(elements=4, tension_field=True)),
-        ("mesh.accuracy", lambda: fm.Scene(material=NH, mesh=fm.disc(accuracy=1e-3), obstacles=[fm.Plane(0.5)])),
         ("over", lambda: fm.vary(plate(elements=4), "material.alpha", [1.0], hold={"pressure": 0.0})),
     ],
 )

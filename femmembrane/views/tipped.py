@@ -39,6 +39,11 @@ _LOOKS: dict[bool | None, tuple[str, dict[str, Any]]] = {
     False: ("unstable at a held volume or not known", {"color": _LINE, "linewidth": 1.0, "linestyle": "--"}),
     None: ("stability not tested", {"color": _GREY, "linewidth": 1.4}),
 }
+#: columns that are drawn along cubics, and those of them that change their sign with the direction in which the membrane leans
+_SMOOTH = (*PLACES, "amplitude", "shift", "energy", "elastic_energy", "magnetic_energy", "load_energy", "electric_energy")
+_ODD = ("amplitude", "shift")
+#: corners of the line between two points of the branch
+_CORNERS = 24
 
 
 def surface_at(equilibrium: TippedEquilibrium, angles: Array) -> dict[str, Array]:
@@ -128,13 +133,6 @@ def _columns(revolution: Revolution, sectors: int) -> NDArray[np.int64]:
     """Number of the angle of each point."""
     turns = np.rint(np.arctan2(revolution.sine, revolution.cosine) / (2 * np.pi) * sectors)
     return np.mod(turns.astype(np.int64), sectors)
-
-
-#: columns that are drawn along cubics, and those of them that change their sign with the direction in which the membrane leans
-_SMOOTH = (*PLACES, "amplitude", "shift", "energy", "elastic_energy", "magnetic_energy", "load_energy", "electric_energy")
-_ODD = ("amplitude", "shift")
-#: corners of the line between two points of the branch
-_CORNERS = 24
 
 
 def plot_tipped(branch: TippedBranch, path: str | PathLike[str] | None, ax: Axes | None, x: str, y: str, label: str) -> Any:

@@ -19,7 +19,7 @@ from ..results.analyses import remarks
 from ..results.tipped import TippedBranch, TippedEquilibrium
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
-from .picture import DrawnMembrane, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
+from .picture import DrawnMembrane, MovingBodies, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
 from .surroundings import Box, place_of
 from .tipped import COLOR, WavySurface
 
@@ -158,13 +158,26 @@ class _Stage:
         boxes = [s.box for s in self.surfaces]
         box = Box(max(b.radius for b in boxes), min(b.low for b in boxes), max(b.high for b in boxes))
         self.membrane = DrawnMembrane(self.plotter, self.limits, box.size)
-        drawn = draw_surroundings(self.plotter, self.branch[0].scene, box)
+        self.bodies = None
+        scenes = [equilibrium.scene for equilibrium in self.branch]
+        if all((scene.sources, scene.obstacles) == (scenes[0].sources, scenes[0].obstacles) for scene in scenes):
+            drawn = draw_surroundings(self.plotter, scenes[0], box)
+        else:
+            self.bodies = MovingBodies(self.plotter, scenes, box)
+            drawn = self.bodies.points
         draw_key(self.plotter, self.surfaces[0], self.limits)
-        aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11)
+        lines = max(self.caption(k).count("\n") for k in range(len(self.branch)))
+        aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11, words=_further(lines))
 
     def draw(self, index: int) -> None:
         self.membrane.show(self.surfaces[index])
-        write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total, self.units))
+        if self.bodies is not None:
+            self.bodies.show(self.branch[index].scene)
+        write_caption(self.plotter, self.caption(index))
+
+    def caption(self, index: int) -> str:
+        """The words beside a step."""
+        return _caption(self.branch[index], self.numbers[index], self.total, self.units)
 
 
 def _surface(equilibrium: Equilibrium | TippedEquilibrium, color: str) -> Surface:
@@ -199,8 +212,13 @@ def _told(frames: Iterator[Frame], total: int, on_frame: OnFrame | None) -> Iter
 def write_caption(plotter: pyvista.Plotter, text: str) -> None:
     """Lines at the upper left, in place of those before."""
     width, height = plotter.window_size
-    low = 0.9 - 0.035 * max(text.count("\n") - 1, 0)  # the first line stays where it is
+    low = 0.9 - _further(text.count("\n"))  # the first line stays where it is
     plotter.add_text(text, position=(0.03 * width, low * height), font_size=11 * height / 720, color="black", name="caption", render=False)
+
+
+def _further(breaks: int) -> float:
+    """What a caption takes of the height beyond two lines."""
+    return 0.035 * max(breaks - 1, 0)
 
 
 def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units = SCALED) -> str:

@@ -13,6 +13,7 @@ border, solved by Broyden's method. Its forces converge at twice the order of th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
@@ -119,7 +120,7 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
 def _smoothed(root: ContactPotential, held: Mask, fill: bool) -> Mask:
     """A set without holes shorter than an element, or without zones as short: a guess next to a border may have them from round-off."""
     new, at = held.copy(), np.flatnonzero(held == fill)
-    for one, other in zip(at[:-1], at[1:], strict=True):
+    for one, other in pairwise(at):
         if 1 < other - one <= root.space.degree and root.nodes[other] - root.nodes[one] == other - one:
             new[one + 1 : other] = fill
     return new

@@ -273,6 +273,10 @@ def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
     legend = draw()
     if figure is None or not hasattr(figure, _HEIGHTS) or "loc" in look or not covers(legend, axes):
         return  # in figures of others there may be no room below
+    for corner in _CORNERS:  # Matplotlib's own choice looks at corners of lines, and not as far from them
+        legend.set_loc(corner)
+        if not _over(legend, axes):
+            return
     legend.remove()
     low = axes.get_window_extent().y0 - axes.xaxis.get_tightbbox().y0  # type: ignore[union-attr]  # the axes are shown
     place = axes.transAxes + ScaledTranslation(0.0, -low / figure.dpi - 0.05, figure.dpi_scale_trans)
@@ -284,10 +288,18 @@ def covers(legend: Any, axes: Axes) -> bool:
     """Whether a legend lies over a line, a marker or words in its axes."""
     figure = legend.get_figure(root=True)
     figure.draw_without_rendering()
+    return _over(legend, axes)
+
+
+def _over(legend: Any, axes: Axes) -> bool:
+    """The same, in a figure that is laid out."""
+    figure = legend.get_figure(root=True)
     box = legend.get_window_extent().padded(_CLEAR * figure.dpi / 72)
     return covered(axes, box) > 0 or any(box.overlaps(text.get_window_extent()) for text in axes.texts if text.get_text())
 
 
+#: where a legend may stand in its axes
+_CORNERS = ("upper right", "upper left", "lower right", "lower left", "center right", "center left")
 #: height in inches that a figure of this package had before a legend stood below its axes, and the heights of these legends
 _HEIGHTS = "_femmembrane_heights"
 

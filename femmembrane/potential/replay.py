@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np

@@ -22,6 +22,7 @@ from .analyses.base import Variable
 from .equilibrium import Equilibrium
 from .path_memory import PathMemory, TraceMemory
 from .special_point import Jump, SpecialPoint
+from .zones import ZONE_CHANGES, ZoneChange
 
 if TYPE_CHECKING:
     import xarray
@@ -140,7 +141,26 @@ def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str, o
     own: dict[str, Variable] = {}
     if over:
         own[f"{prefix}equilibrium_{over}"] = (dimension,), typed(over, (p.equilibrium.number(over) for p in points))
-    return {**kinds, **own, **numbers, **tangents, **states}
+    return {**kinds, **own, **numbers, **tangents, **_zone_variables(points, dimension, prefix), **states}
+
+
+def _zone_variables(points: Sequence[SpecialPoint], dimension: str, prefix: str) -> dict[str, Variable]:
+    """Where zones of a tension field open and close."""
+    if not any(p.zone for p in points):
+        return {}
+    zones = [p.zone or ZoneChange("", "", float("nan"), float("nan")) for p in points]
+    return {
+        f"{prefix}changing_zone_{name}": ((dimension,), typed(f"changing_zone_{name}", (getattr(zone, name) for zone in zones)))
+        for name in ZONE_CHANGES
+    }
+
+
+def _zones_of(dataset: xarray.Dataset, prefix: str, count: int) -> list[ZoneChange | None]:
+    if f"{prefix}changing_zone_kind" not in dataset:
+        return [None] * count
+    kinds, places = (map(str, dataset[f"{prefix}changing_zone_{name}"].values) for name in ZONE_CHANGES[:2])
+    radii = (dataset[f"{prefix}changing_zone_{name}"].values.tolist() for name in ZONE_CHANGES[2:])
+    return [ZoneChange(*each) if each[0] else None for each in zip(kinds, places, *radii, strict=True)]
 
 
 def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str) -> tuple[SpecialPoint, ...] | None:
@@ -156,8 +176,8 @@ def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: 
         rows = np.array(dataset[prefix + "tangent"].values, dtype=np.float64)
         tangents = [row if np.isfinite(row).all() else None for row in rows]
     return tuple(
-        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, over=over, tangent=t)
-        for k, n, e, t in zip(kinds, numbers, states, tangents, strict=True)
+        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, over=over, tangent=t, zone=z)
+        for k, n, e, t, z in zip(kinds, numbers, states, tangents, _zones_of(dataset, prefix, len(kinds)), strict=True)
     )
 
 

@@ -17,6 +17,7 @@ from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium, recorded
 from ..results.path_memory import PathMemory
 from ..results.special_point import SpecialPoint
+from ..results.zones import KINDS, ZoneChange
 from ..scene import Scene
 from ..solve.continuation import BranchPoint
 from ..solve.controls import Gas, PressureControl, VolumeControl
@@ -24,6 +25,7 @@ from ..solve.newton import RESIDUAL, correct, relative_residual
 from ..solve.segment import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
+from ..solve.zone_events import ZoneEvent
 
 if TYPE_CHECKING:
     from .running import Run
@@ -140,4 +142,5 @@ def special_point(run: Run[Branch], scene: Scene, located: Located[BranchPoint],
     # over a number the direction is none of the branch of one scene
     tangent = point.tangent.copy() if located.kind == "branch_point" and len(point.tangent) == len(state.x) + 1 else None
     place = (eq.volume, eq.pressure, eq.center_height)
-    return SpecialPoint(located.kind, *place, located.error, eq, azimuthal=azimuthal, over=run.over, tangent=tangent)
+    zone = ZoneChange(KINDS[located.zone], located.place, *located.radii) if isinstance(located, ZoneEvent) else None
+    return SpecialPoint(located.kind, *place, located.error, eq, azimuthal=azimuthal, over=run.over, tangent=tangent, zone=zone)

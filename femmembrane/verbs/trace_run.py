@@ -31,6 +31,7 @@ from ..solve.special_points import branch_points, branches_crossing
 from ..solve.start import start_at_volume, usual_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
+from ..solve.zone_events import ZoneEvent, zone_events
 from ..stability.azimuthal import azimuthal_eigenvalue
 from .arguments import check_ill_posed, check_max_steps
 from .meshing import carried
@@ -405,10 +406,15 @@ class TraceRun(Run[Branch]):
         with self.timed("special_points"):
             located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
             crossed = self.crossed(segment)
-            for fold in sorted(located + crossed + contact_events(segment), key=lambda f: f.point.sigma):
+            located += [*crossed, *contact_events(segment), *self._zone_events(segment)]
+            for fold in sorted(located, key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
             return self.closing(segment, crossed, last)
+
+    def _zone_events(self, segment: Segment[BranchPoint]) -> list[ZoneEvent]:
+        """Where zones of a tension field open or close."""
+        return zone_events(segment, self.own) if self.scene.tension_field else []
 
     def closing(self, segment: Segment[Any], crossed: Sequence[Located[Any]], last: BranchPoint | None) -> BranchPoint | None:
         """The point at which the branch comes back to where it set out, if it does so before the end of the trace."""

@@ -43,6 +43,10 @@ MARKERS = {
     "number_fold": ("h", "limit point in the number"),
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
+    "touch": ("P", "a body is touched"),
+    "release": ("X", "a body is let go"),
+    "zone_opens": ("<", "a zone opens"),
+    "zone_closes": (">", "a zone closes"),
 }
 
 
@@ -222,6 +226,8 @@ def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:
         "height_fold": (),
         "number_fold": tuple(branch.hold),
         "azimuthal_onset": (point.azimuthal,),
+        "zone_opens": (),
+        "zone_closes": (),
     }
     return of_kind.get(str(point.kind))
 

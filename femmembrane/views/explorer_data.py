@@ -191,6 +191,8 @@ def _state(state: State, place: Array, names: Sequence[str], units: Units) -> di
 
 def _point_name(point: SpecialPoint) -> str:
     name = MARKERS.get(str(point.kind), ("X", str(point.kind).replace("_", " ")))[1]
+    if point.zone is not None:
+        return f"{name}: {point.zone}"
     return f"{name}, n = {point.azimuthal}" if point.azimuthal else name
 
 

@@ -23,20 +23,19 @@ from numpy.typing import ArrayLike
 
 from ..discretization.curve import Curve
 from ..discretization.meridian import Accuracy, Asked, Meridian, by_quantity, in_words
-from ..discretization.space import Space, space_of
-from ..errors import InputError, SolveError, Status
+from ..discretization.space import Space, space_of, transferred
+from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from ..solve.branch import first_point
-from ..solve.controls import CONTROLS, Control
-from ..solve.finer_space import met_across, moved, solved_in, transferred
+from ..solve.controls import CONTROLS
+from ..solve.finer_space import met_across, moved, solved_in
 from ..solve.newton import NewtonResult
 from ..solve.state import State
 from ..solve.state_resolution import largest_kink
 from ..solve.wellposed import ill_posed, stress_scale
 from ..stability.spectrum import SpectrumError
 from ..stability.verdict import axisymmetric_verdict
-from .borders import holding, put_on_borders
 from .error_estimate import finer_space, same_state
 
 if TYPE_CHECKING:
@@ -292,7 +291,7 @@ class _Trial:
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
         for eq, weight in zip(self.states, weights, strict=True):
-            density = np.maximum(_misses(space, eq.of_branch.state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+            density = np.maximum(_misses(space, eq.potential.carried(eq.state)) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
             smooth = np.exp(np.interp(s, centres, np.log(density)))
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
@@ -313,22 +312,10 @@ class _Trial:
             held = kind.at(kind.value(eq.potential.space, eq.state, eq.pressure, eq.volume))
             result = solved_in(potential, held, eq.potential, eq.state, eq.pressure, damped=True)
             if result.status is Status.CONVERGED:
-                state = _followed(potential, here, State.of(result), held)
-                if state is None:
-                    continue
-                error = relative_error(state.evaluation.potential, state.x, state.pressure, self.controls, self.yardstick)
+                state = State.of(result)
+                error = relative_error(state.evaluation.potential, state.evaluation.x, state.pressure, self.controls, self.yardstick)
                 return error if np.isfinite(error) else np.inf
         return np.inf
-
-
-def _followed(potential: Potential, scene: Scene, state: State, held: Control) -> State | None:
-    """The state with elements that follow its zones where the scene wants that; None where it is lost."""
-    if not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
-        return state
-    try:
-        return put_on_borders(scene, scene, state, holding(held)).state
-    except (InputError, SolveError):  # as on too few elements
-        return None
 
 
 @dataclass(frozen=True)
@@ -374,7 +361,7 @@ def _errors(
         errors["profile"] = moved(finer, better.x, transferred(potential.space, x, finer.space))
     if "eigenvalues" in yardstick.asked:
         try:
-            pairs = [_eigenvalues(potential, evaluation), _eigenvalues(finer, better.evaluation)]
+            pairs = [_eigenvalues(potential, evaluation), _eigenvalues(better.evaluation.potential, better.evaluation)]
         except SpectrumError:
             return {**errors, "eigenvalues": np.inf}
         values = np.maximum(np.abs(pairs[1]), yardstick.eigenvalues)
@@ -428,7 +415,7 @@ def _estimated(equilibria: Sequence[Equilibrium], controls: tuple[str, ...], ele
     known = np.isfinite(errors)
     states = [eq for eq, k in zip(equilibria, known, strict=True) if k]
     wrinkled = any(eq.scene.tension_field and (eq.potential.evaluate(eq.state, eq.pressure).stress <= 0).any() for eq in states)
-    return _Trial(equilibria[0].of_branch.potential.space, states, controls, errors[known], elements, wrinkled, yardstick)
+    return _Trial(equilibria[0].of_branch.potential.root.space, states, controls, errors[known], elements, wrinkled, yardstick)
 
 
 def _yardstick(equilibria: Sequence[Equilibrium], asked: Accuracy) -> Yardstick:

@@ -91,7 +91,9 @@ class Space(Numbering):
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
     def with_moved(self, places: tuple[tuple[int, float], ...]) -> Space:
-        """The same space with some ends of elements at other places along the meridian: the numbering stays.
+        """The same space with some ends of elements at other places along the meridian, and those between carried along.
+
+        The numbering stays. Ends that are not :attr:`movable` stay as well.
 
         Parameters
         ----------
@@ -101,12 +103,25 @@ class Space(Numbering):
         moved: Space = copy.copy(self)
         for name in [name for name in vars(moved) if isinstance(getattr(type(moved), name, None), cached_property)]:
             del moved.__dict__[name]
-        ends = self.ends.copy()
-        for k, s in places:
-            ends[k] = s
+        known = dict(enumerate(self.ends.tolist()))
+        index = sorted({k for k, _ in places}.union(np.flatnonzero(~self.movable).tolist()))
+        known.update(places)
+        at = np.array([known[k] for k in index])
+        ends = np.interp(self.ends, self.ends[index], at)
+        ends[index] = at
         moved._place(ends)
         moved._known_ends = {}
         return moved
+
+    @cached_property
+    def movable(self) -> NDArray[np.bool_]:
+        """Which ends of elements can be moved: inside the meridian, and where it is smooth."""
+        found = np.zeros(self.n_elements + 1, dtype=bool)
+        if self.n_elements > 1:
+            kinks = self._ends_of_elements[3][: self.n_elements - 1]
+            found[1:-1] = kinks < 1e-6
+            found[self.breaks] = False
+        return found
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
@@ -391,6 +406,13 @@ class Space(Numbering):
         return u_s, w_s
 
 
+def transferred(space: Space, x: Array, onto: Space) -> Array:
+    """Free coefficients in another space of the interpolant of the displacement with free coefficients x."""
+    points = onto.interpolation_points()
+    u, _, w, _ = space.evaluate(x, points.ravel())
+    return onto.interpolate(u.reshape(points.shape), w.reshape(points.shape))
+
+
 @lru_cache(maxsize=32)
 def space_of(
     mesh: Meridian,
@@ -406,9 +428,7 @@ def space_of(
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return moved_space_of(
-        scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies)
-    )
+    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, scene.follows)
 
 
 @lru_cache(maxsize=32)

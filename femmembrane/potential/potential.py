@@ -147,16 +147,16 @@ class Evaluation:
         return factor if self.spring is None else SpringFactor(factor, self.spring)
 
     def carried(self, v: Array) -> Array:
-        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
-        return v
+        """See :meth:`Potential.carried`."""
+        return self.potential.carried(v)
 
     def brought(self, v: Array) -> Array:
-        """A displacement on the mesh of the scene here, with what may stand behind it."""
-        return v
+        """See :meth:`Potential.brought`; without what bodies keep from moving."""
+        return self.potential.brought(v)
 
     def row(self, row: Array) -> Array:
-        """A linear form of :meth:`carried` displacements as one of displacements here."""
-        return row
+        """See :meth:`Potential.row`."""
+        return self.potential.row(row)
 
     def released(self) -> Evaluation | None:
         """The same state without the nodes that bodies hold by no force; None where there are none."""
@@ -242,9 +242,10 @@ class Potential:
         Whether the membrane without load is flat and without stress, so that nothing but a load gives it stiffness across its plane.
     """
 
-    #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
+    #: rigid bodies that the membrane may touch
     obstacles: tuple[Obstacle, ...] = ()
-    unsettled = False
+    #: whether ends of elements follow the borders of a state, and whether a corrector has still to find these, and which nodes are held
+    follows = unsettled = False
     #: a potential with the same expressions on other points
     _like: Potential | None = None
     symbols: tuple[ca.SX, ca.SX, ca.SX]
@@ -254,7 +255,7 @@ class Potential:
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "bodies", ()))
+        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "follows", False))
         self.space = (
             space_of(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
             if quadrature is None
@@ -313,13 +314,25 @@ class Potential:
         """A state with the nodes that bodies hold moved onto them."""
         return x
 
+    def carried(self, v: Array) -> Array:
+        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders."""
+        return v
+
+    def brought(self, v: Array) -> Array:
+        """A displacement on the mesh of the scene here, with what may stand behind it."""
+        return v
+
+    def row(self, row: Array) -> Array:
+        """A linear form of :meth:`carried` displacements as one of displacements here."""
+        return row
+
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
         return 0.0
 
     @property
     def root(self) -> Potential:
-        """The potential on the mesh of the scene: this one, unless ends of elements follow borders of contact."""
+        """The potential on the mesh of the scene: this one, unless ends of elements follow borders."""
         return self
 
     @property
@@ -666,7 +679,7 @@ def _plain(scene: Scene) -> Scene:
         electric = scene.electric.plain(scene.scales)
     ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
     plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
-    return scene.replace(title="", follow_zones=False, run=None, analysis=type(scene.analysis)(), **plain)
+    return scene.replace(title="", follow_zones=scene.follows_zones, run=None, analysis=type(scene.analysis)(), **plain)
 
 
 def require_elements(scene: Scene) -> None:
@@ -678,8 +691,9 @@ def require_elements(scene: Scene) -> None:
 
 @lru_cache(maxsize=64)
 def _potential_of(scene: Scene) -> Potential:
-    if not scene.bodies:
+    if not scene.follows:
         return Potential(scene)
     from .contact import ContactPotential
+    from .following import WrinklingPotential
 
-    return ContactPotential(scene)
+    return ContactPotential(scene) if scene.bodies else WrinklingPotential(scene)

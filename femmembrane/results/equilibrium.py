@@ -256,8 +256,6 @@ class Equilibrium:
             Default: the nodes.
         """
         space = self.potential.space
-        if r is None:
-            space = self.potential.root.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
     def verdict(

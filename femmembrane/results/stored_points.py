@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization.meridian import on_own_ends
 from ..errors import Status
 from ..quantities import typed
 from ..scene.variation import Parameter
@@ -63,21 +62,19 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
         prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
         prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
         prefix + "state": ((dimension, "coefficient"), np.array([e.state for e in equilibria]).reshape(len(equilibria), width)),
-        **_own_meshes(equilibria, width, dimension, prefix),
+        **_on_branches(equilibria, width, dimension, prefix),
     }
 
 
-def _own_meshes(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str) -> dict[str, Variable]:
-    """Where elements follow zones: the ends of the elements of each equilibrium, and the states on the mesh of the branch."""
+def _on_branches(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str) -> dict[str, Variable]:
+    """The states on the mesh of the branch, of those that were put on borders after it."""
     if all(e.on_branch is None for e in equilibria):
         return {}
-    ends = np.array([e.scene.mesh.breakpoints() for e in equilibria])
-    states = equilibrium_variables([e.of_branch for e in equilibria], width, dimension, prefix + ON_BRANCH)
-    return {prefix + "element_ends": ((dimension, "element_end"), ends), **states}
+    return equilibrium_variables([e.of_branch for e in equilibria], width, dimension, prefix + ON_BRANCH)
 
 
 def _border_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str) -> dict[str, Variable]:
-    """Ends of elements at borders of contact, with their places: as many columns as an equilibrium has most."""
+    """Ends of elements at borders, with their places: as many columns as an equilibrium has most."""
     most = max((len(e.scene.borders) for e in equilibria), default=0)
     if not most:
         return {}
@@ -104,17 +101,15 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
     scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
     scalars.setdefault("magnetic_energy", [0.0] * count)
     scenes = [scene] * count
-    if prefix + "border_end" in dataset:
-        scenes = [scene.bordered(borders) for borders in _borders_of(dataset, prefix)]
     if over:
         scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
     on_branch: list[Equilibrium | None] = [None] * count
-    if prefix + "element_ends" in dataset:  # elements follow zones
-        ends = _finite(dataset, prefix + "element_ends", count, scene.mesh.elements + 1)
-        states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
-        for k, own in enumerate(ends):
-            if not np.array_equal(own, scene.mesh.breakpoints()):
-                on_branch[k], scenes[k] = states_there[k], scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, own))
+    if prefix + "border_end" in dataset:
+        borders = _borders_of(dataset, prefix)
+        if prefix + ON_BRANCH + "state" in dataset:
+            states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
+            on_branch = [eq if own else None for eq, own in zip(states_there, borders, strict=True)]
+        scenes = [each.bordered(own) for each, own in zip(scenes, borders, strict=True)]
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},

@@ -334,6 +334,11 @@ class Scene:
         return bool(getattr(self.mesh, "open", False))
 
     @property
+    def follows(self) -> bool:
+        """Whether ends of elements follow borders, of contact or of zones."""
+        return bool(self.bodies) or self.follows_zones
+
+    @property
     def follows_zones(self) -> bool:
         """Whether there are borders that elements follow."""
         return self.follow_zones and self.tension_field

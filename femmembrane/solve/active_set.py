@@ -23,7 +23,8 @@ from ..potential import Array, Potential
 from .controls import ArcLengthControl, CarriedArcLength, Control
 
 if TYPE_CHECKING:
-    from ..potential.contact import ContactEvaluation, ContactPotential, Mask
+    from ..potential.contact import ContactEvaluation, ContactPotential
+    from ..potential.following import FollowingPotential, Mask
     from .continuation import BranchPoint
     from .newton import NewtonResult
     from .segment import Located, Segment
@@ -216,7 +217,7 @@ def _assigned(root: ContactPotential, zones: list[tuple[int, int]], places: Arra
             return None
         borders += [Border(number, side) for number, side in zip(numbers, sides, strict=True)]
     taken = [border.end for border in borders]
-    if len(set(taken)) < len(taken) or not all(0 < number < ends.size - 1 and root.movable[number] for number in taken):
+    if len(set(taken)) < len(taken) or not all(0 < number < ends.size - 1 and root.space.movable[number] for number in taken):
         return None
     moved = ends.copy()
     moved[taken] = places
@@ -346,7 +347,7 @@ def _in_place(evaluation: ContactEvaluation) -> bool:
     return bool(forces.min(initial=0.0) >= -_PULL * forces.max(initial=0.0) and free.min(initial=0.0) >= inside)
 
 
-def on_borders(control: Control, potential: ContactPotential) -> Control:
+def on_borders(control: Control, potential: FollowingPotential) -> Control:
     """A control of coefficients on the mesh of the scene as one of those on a mesh that follows borders."""
     if not isinstance(control, ArcLengthControl) or not potential.borders:
         return control

@@ -58,7 +58,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def unit_point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose tangent is known up to its length."""
-        if not self.potential.obstacles:
+        if not self.potential.follows:
             return self.point(state, tangent / self.norm(tangent), sigma)
         carried = joined(state.evaluation.carried(tangent[:-1]), float(tangent[-1]))
         length = self.norm(carried)
@@ -66,7 +66,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose unit tangent is known."""
-        own = state.evaluation.brought(tangent) if self.potential.obstacles else None
+        own = state.evaluation.brought(tangent) if self.potential.follows else None
         return BranchPoint(state, joined(state.x, state.pressure), tangent, self.dual(tangent), sigma, own=own)
 
     def resolve(self, guess: Array, row: Array, near: BranchPoint) -> BranchPoint:

@@ -13,6 +13,7 @@ from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
 from .active_set import settled
 from .controls import ArcLengthControl, Control, VolumeControl
+from .zone_borders import settled_zones
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
@@ -37,7 +38,7 @@ PRESSURE = 1e-9
 class NewtonResult:
     """Where the corrector ended.
 
-    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders of contact where there are any, with ``bordered``.
+    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders where there are any, with ``bordered``.
     ``correction`` is the relative size of the Newton correction at x by ``bordered``, the last factors, at x or one correction before;
     ``residual`` and ``gap`` are evaluated at x.
     """
@@ -86,6 +87,8 @@ def correct(
     if not potential.unsettled:
         return _corrected(potential, control, x, pressure, magnetic, damped, tolerance, max_iterations)
     once = partial(_corrected, magnetic=magnetic, damped=damped, tolerance=tolerance, max_iterations=max_iterations)
+    if not potential.obstacles:
+        return settled_zones(once, control, potential, x, pressure)
     return settled(once, control, potential, x, pressure, magnetic)
 
 

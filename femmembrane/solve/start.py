@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from ..discretization.space import transferred
 from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
 from .banded import negative_among
@@ -28,7 +29,6 @@ from .branch import BranchProblem, first_point
 from .contact import touches_source
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, PressureControl, VolumeControl
-from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .minimize import minimize

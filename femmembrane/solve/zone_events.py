@@ -16,20 +16,14 @@ import numpy as np
 
 from ..discretization.strains import strained_at
 from ..errors import SolveError
-from ..physics.kinematics import hencky_strains
 from ..potential import Array
 from .segment import Located, Segment
 from .state import State
 from .wellposed import apparent
+from .zone_strains import BITS, Runs, Strains
 
-#: bits that negative strains along the meridian and around the axis add to the number of a kind of zones
-BITS = (2, 1)
-#: points of each element at which strains are looked at; parts of an interval in which an extremum is closed in, and how often that is done
-_SAMPLES, _PARTS, _ZOOMS = 9, 24, 2
 #: part of the change between neighbouring points by which an extremum may lie beyond the parabola through three of them
 _BEYOND = 0.5
-#: strain over the largest one that is round-off
-_ROUND_OFF = 1e-11
 #: most points of a segment that are looked at to tell its events apart
 _MOST_LOOKS = 24
 #: how much smaller than those of all other zones the extreme strain of one must be for it to be the one that vanishes
@@ -75,7 +69,7 @@ def zone_events(segment: Segment[Any], own: Own) -> list[ZoneEvent]:
     """
     if segment.leaving:
         return []
-    ends = [_Strains(own(point.state)) for point in (segment.a, segment.b)]
+    ends = [Strains(own(point.state).evaluation) for point in (segment.a, segment.b)]
     events: list[ZoneEvent] = []
     for component in (0, 1):
         if _alike(ends[0].screened[component], ends[1].screened[component]):
@@ -110,94 +104,6 @@ def _doubtful(g: Array) -> bool:
     return bool(inner.any() or any(outer))
 
 
-class _Strains:
-    """Strains beyond natural width in a state, along its meridian."""
-
-    def __init__(self, state: State) -> None:
-        self.evaluation, self.potential = state.evaluation, state.evaluation.potential
-        self.space = self.potential.space
-        self.first, self.last = float(self.space.ends[0]), float(self.space.ends[-1])
-
-    @property
-    def screened(self) -> Array:
-        """At the quadrature points in their order, shape (2, n)."""
-        space = self.space
-        u, u_x, _, w_x = space.displacement_at_quadrature(self.evaluation.x)
-        with np.errstate(all="ignore"):
-            e = hencky_strains(space.R, space.R_x, space.Z_x, u, u_x, w_x)
-        return self._beyond(space.R, space.Z, space.s, *e).transpose(0, 2, 1).reshape(2, -1)
-
-    def at(self, s: Array) -> Array:
-        """At parameters s, shape (2, n)."""
-        found = strained_at(self.space, self.evaluation.x, s)
-        return self._beyond(found.R, found.Z, s, *found.strains)
-
-    def _beyond(self, R: Array, Z: Array, s: Array, e1: Array, e2: Array) -> Array:
-        response = self.potential.response_at(self.evaluation.x, R, Z, s, self.evaluation.factor)
-        return np.stack(response.beyond(e1, e2))  # type: ignore[attr-defined]  # that of a tension field
-
-    def runs(self, component: int) -> _Runs:
-        """The parts of the meridian where one of the strains keeps its sign, by its extrema to round-off."""
-        ends = self.space.ends
-        s = np.linspace(ends[:-1], np.append(np.nextafter(ends[1:-1], -np.inf), ends[-1]), _SAMPLES, axis=1).ravel()
-        g = self.at(s)[component]
-        least = _ROUND_OFF * float(np.abs(g).max(initial=0.0))
-        away = np.where(g < 0, -g, g)
-        negative = g < 0
-        inner = (negative[1:-1] == negative[:-2]) & (negative[1:-1] == negative[2:])
-        dips = np.flatnonzero(inner & (away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:])) + 1
-        near = np.maximum(np.abs(np.diff(g))[dips - 1], np.abs(np.diff(g))[dips])
-        extra = [self.extreme(component, float(s[k - 1]), float(s[k + 1]), g[k] >= 0) for k in dips[away[dips] <= near]]
-        if extra:
-            place, value = np.array(extra).T
-            order = np.argsort(np.append(s, place), kind="stable")
-            s, g = np.append(s, place)[order], np.append(g, value)[order]
-        return _Runs.of(s, np.where(np.abs(g) <= least, 0.0, g))
-
-    def extreme(self, component: int, low: float, high: float, least: bool) -> tuple[float, float]:
-        """Where one of the strains is least, or largest, between two places, and its value there."""
-        ends = self.space.ends
-        inner = ends[(ends > low) & (ends < high)]
-        s = np.unique(np.concatenate([np.linspace(low, high, _PARTS + 1), inner, np.nextafter(inner, -np.inf)]))
-        if inner.size > 2:  # a long way: as many points in each element
-            s = np.unique(np.append(s, np.linspace(ends[:-1], ends[1:], _SAMPLES, axis=1).ravel()))
-            s = s[(s >= low) & (s <= high)]
-        for k in range(_ZOOMS + 1):
-            g = self.at(s)[component] * (1.0 if least else -1.0)
-            j = int(np.argmin(g))
-            if k < _ZOOMS:
-                s = np.linspace(s[max(j - 1, 0)], s[min(j + 1, s.size - 1)], _PARTS + 1)
-        place, value = float(s[j]), float(g[j])
-        if 0 < j < s.size - 1 and (curved := float(g[j + 1] - 2 * g[j] + g[j - 1])) > 0:
-            shift = float(g[j - 1] - g[j + 1]) / (2 * curved)
-            place, value = place + shift * float(s[j + 1] - s[j]), value - shift**2 * curved / 2
-        return place, value if least else -value
-
-
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """Parts of the meridian where a strain keeps its sign.
-
-    Attributes
-    ----------
-    signs : tuple of bool
-        Whether it is negative in each.
-    peaks : ndarray, shape (2, n)
-        Where it is farthest from zero in each, and its value there.
-    """
-
-    signs: tuple[bool, ...]
-    peaks: Array
-
-    @classmethod
-    def of(cls, s: Array, g: Array) -> _Runs:
-        negative = g < 0
-        starts = np.flatnonzero(np.append(True, negative[1:] != negative[:-1]))
-        parts = zip(starts, np.append(starts[1:], g.size), strict=True)
-        top = [a + int(np.argmax(np.abs(g[a:b]))) for a, b in parts]
-        return cls(tuple(negative[starts].tolist()), np.array([s[top], g[top]]))
-
-
 class _Search:
     """The search for the events of one of the strains on a segment."""
 
@@ -205,16 +111,16 @@ class _Search:
         self.segment, self.own, self.component = segment, own, component
         self.looks = 0
 
-    def strains(self, share: float) -> _Strains:
+    def strains(self, share: float) -> Strains:
         return self.of(self.segment.at(share))
 
-    def of(self, point: Any) -> _Strains:
-        return _Strains(self.own(point.state))
+    def of(self, point: Any) -> Strains:
+        return Strains(self.own(point.state).evaluation)
 
-    def events(self, ends: list[_Strains]) -> list[ZoneEvent]:
+    def events(self, ends: list[Strains]) -> list[ZoneEvent]:
         return self._between(0.0, ends[0].runs(self.component), 1.0, ends[1].runs(self.component))
 
-    def _between(self, low: float, a: _Runs, high: float, b: _Runs) -> list[ZoneEvent]:
+    def _between(self, low: float, a: Runs, high: float, b: Runs) -> list[ZoneEvent]:
         """The events between two shares, in order."""
         if a.signs == b.signs:
             return []
@@ -230,7 +136,7 @@ class _Search:
             return []
         return self._between(low, a, middle, between) + self._between(middle, between, high, b)
 
-    def _single(self, low: float, a: _Runs, high: float, b: _Runs) -> ZoneEvent | None:
+    def _single(self, low: float, a: Runs, high: float, b: Runs) -> ZoneEvent | None:
         """The event, where one zone alone appears or vanishes between two shares and it is clear which; None where that is not so."""
         opens = len(b.signs) > len(a.signs)
         more, fewer = (b, a) if opens else (a, b)
@@ -275,7 +181,7 @@ class _Search:
             return None
         return self.segment.root("zone_opens" if opens else "zone_closes", value, low, high)
 
-    def _event(self, located: Located[Any], negative: bool, strains: _Strains, s: float, place: str) -> ZoneEvent:
+    def _event(self, located: Located[Any], negative: bool, strains: Strains, s: float, place: str) -> ZoneEvent:
         at = strained_at(strains.space, strains.evaluation.x, np.array([s]))
         other = float(strains.at(np.array([s]))[1 - self.component, 0])
         zone = BITS[self.component] * negative + BITS[1 - self.component] * (other < 0)

@@ -9,6 +9,7 @@ import numpy as np
 from ..accuracy.borders import holding
 from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, profile_norms
 from ..checks import only, switch
+from ..discretization.space import transferred
 from ..errors import SolveError, Status
 from ..potential import Array, potential_of
 from ..results.convergence import COMPARED, PROFILES, ROUND_OFF, Convergence
@@ -16,7 +17,6 @@ from ..results.equilibrium import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..scene.run import GAS
 from ..solve.controls import CONTROLS, Control, control_kind
-from ..solve.finer_space import transferred
 from ..solve.newton import correct
 from ..solve.start import usual_volume
 from ..solve.state import State

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential
 from ..results.analyses import asked
@@ -43,8 +44,8 @@ def resume(potential: Potential, start: Equilibrium) -> State:
     if start.state.shape != (potential.space.n_free,):
         raise InputError("start", start, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     x = start.state
-    if potential.obstacles and start.scene.borders:
-        x = start.potential.evaluate(x, start.pressure).carried(x)
+    if start.scene.borders:
+        x = transferred(start.potential.space, x, potential.space)
     result = correct(potential, VolumeControl(start.volume), x, start.pressure)
     if result.status is not Status.CONVERGED:
         result = correct(potential, PressureControl(start.pressure), x, start.pressure)
@@ -67,7 +68,7 @@ def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> Sta
     kept = kept.of_branch
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
-    if potential.obstacles:
+    if potential.follows:
         potential = kept.potential
     evaluation = potential.evaluate(kept.state, kept.pressure, number)
     force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
@@ -124,14 +125,14 @@ def record_on_borders(
         Where it is lost on the way.
     """
     potential = state.evaluation.potential
-    if not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
+    if potential.follows:
+        scene = scene.bordered(potential.scene.borders)
+    if potential.follows or not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
         return record(scene, potential, state, previous, clock, gas)
-    found = put_on_borders(scene, scene, state, solve)
-    if found.scene is scene:
-        return record(scene, potential, state, previous, clock, gas)
-    new = record(found.scene, found.state.evaluation.potential, found.state, previous, clock, gas)
-    there = potential, state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
-    store(new, on_branch=recorded(scene, *there))
+    own, there = put_on_borders(scene, state, solve)
+    new = record(own, there.evaluation.potential, there, previous, clock, gas)
+    on_branch = state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    store(new, on_branch=recorded(scene, potential, *on_branch))
     return new
 
 

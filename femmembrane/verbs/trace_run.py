@@ -453,7 +453,7 @@ class TraceRun(Run[Branch]):
     def _onset(self, segment: Segment[BranchPoint], n: int, low: float, top: float, guess: Array | None = None) -> SpecialPoint:
         def eigenvalue(point: BranchPoint) -> float:
             potential, own = self.potential_at(point), point.state.evaluation
-            if potential.obstacles:
+            if potential.follows:
                 potential = own.potential
             return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
 

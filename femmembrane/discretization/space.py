@@ -90,7 +90,7 @@ class Space(Numbering):
         self._known_ends: dict[int, tuple[int, int, float, float]] = {}
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
-    def with_moved(self, places: tuple[tuple[int, float], ...]) -> Space:
+    def with_moved(self, places: tuple[tuple[int, float], ...], *, alone: bool = False) -> Space:
         """The same space with some ends of elements at other places along the meridian, and those between carried along.
 
         The numbering stays. Ends that are not :attr:`movable` stay as well.
@@ -99,12 +99,14 @@ class Space(Numbering):
         ----------
         places : tuple of (int, float)
             Numbers of ends and their places.
+        alone : bool
+            Whether all others stay, as nodes do that a body holds one by one.
         """
         moved: Space = copy.copy(self)
         for name in [name for name in vars(moved) if isinstance(getattr(type(moved), name, None), cached_property)]:
             del moved.__dict__[name]
         known = dict(enumerate(self.ends.tolist()))
-        index = sorted({k for k, _ in places}.union(np.flatnonzero(~self.movable).tolist()))
+        index = [*range(self.ends.size)] if alone else sorted({k for k, _ in places}.union(np.flatnonzero(~self.movable).tolist()))
         known.update(places)
         at = np.array([known[k] for k in index])
         ends = np.interp(self.ends, self.ends[index], at)
@@ -428,7 +430,8 @@ def space_of(
 
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, scene.follows)
+    borders = scene.borders, scene.follows, bool(scene.bodies)
+    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, *borders)
 
 
 @lru_cache(maxsize=32)
@@ -440,10 +443,11 @@ def moved_space_of(
     prestretch: float,
     borders: tuple[tuple[int, float], ...],
     nodal: bool,
+    alone: bool,
 ) -> Space:
     """The space of a mesh and a degree with some ends of elements elsewhere, see :meth:`Space.with_moved`."""
     space = space_of(mesh, degree, anchored, ends, prestretch, nodal)
-    return space.with_moved(borders) if borders else space
+    return space.with_moved(borders, alone=alone) if borders else space
 
 
 def anchored(scene: Any) -> frozenset[str]:

@@ -31,8 +31,9 @@ from ..kernels.bordered import BorderedFactor
 from ..kernels.interface import Array, Border, Factor, Step
 from ..physics.obstacles import ROUND_OFF, Straight
 from ..threads import cached_property
+from .evaluation import Evaluation
 from .following import FollowingPotential, Mask
-from .potential import Evaluation, Potential
+from .potential import Potential
 
 if TYPE_CHECKING:
     from ..scene import Scene

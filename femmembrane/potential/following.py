@@ -19,7 +19,8 @@ from scipy import sparse
 
 from ..kernels.interface import Array
 from ..threads import cached_property
-from .potential import Potential, potential_of
+from .of_scene import potential_of
+from .potential import Potential
 
 if TYPE_CHECKING:
     from ..discretization.space import Space

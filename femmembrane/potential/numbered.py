@@ -18,8 +18,10 @@ from ..errors import InputError
 from ..kernels.interface import Array, Elements
 from ..physics.magnetisation import Magnetisation
 from ..threads import cached_property
+from .evaluation import Evaluation
 from .expressions import BUILDING, casadi_answers_numpy
-from .potential import Evaluation, Potential, potential_of, require_elements
+from .of_scene import potential_of, require_elements
+from .potential import Potential
 from .replay import Replay
 
 if TYPE_CHECKING:

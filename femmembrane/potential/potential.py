@@ -7,8 +7,6 @@ CasADi differentiates the densities at a point twice. Assembly is a constant lin
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import casadi as ca
@@ -18,21 +16,20 @@ from ..discretization.lift import Moving
 from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
 from ..errors import InputError
 from ..kernels import kernels
-from ..kernels.bordered import BorderedFactor, SpringFactor
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Factor, Step
+from ..kernels.interface import Array, Elements
 from ..physics.along import Along
 from ..physics.kinematics import hencky_strains
-from ..physics.loads import Load, on_hubs, over_reference
+from ..physics.loads import Load, on_hubs
 from ..physics.magnetics import swept
-from ..physics.magnetisation import Magnetisation, position_energy_density, remanence_column, sources_that_act
+from ..physics.magnetisation import Magnetisation, remanence_column, sources_that_act
 from ..physics.response import ELECTRODE, local_square, response_columns, response_of, squared
 from ..physics.sheet import Sheet
 from ..threads import cached_property
 from .charge import Charged
-from .expressions import BUILDING, LIFT, MOVE, casadi_answers_numpy, point_expressions, point_rows, response_expressions
-from .magnetic import wave_function
-from .nearby import Nearby
-from .replay import PointProgram, Replay, at_points
+from .evaluation import Evaluation
+from .expressions import BUILDING, LIFT, MOVE, casadi_answers_numpy, point_expressions
+from .point_terms import PointTerms
+from .replay import PointProgram, Replay
 from .template import expressions_of
 
 if TYPE_CHECKING:
@@ -46,188 +43,7 @@ if TYPE_CHECKING:
 _LITTLE_AHEAD = 1e-5
 
 
-class Evaluation:
-    """Value, gradient and Hessian of E and V at one state x; energies and volume with the 2 pi.
-
-    Attributes
-    ----------
-    elastic_energy, magnetic_energy, volume : float
-    gradient, volume_gradient, unbalanced : ndarray, shape (n_free,)
-        E', V' and P V' - E' at the pressure of the evaluation.
-    finite : bool
-        Whether all derivatives are numbers: outside the domain of the energy they are not.
-    elements : Elements
-        The kernels that answered.
-    spring : ndarray, shape (n_free,), or None
-        a, where the second derivatives are the band plus a a^T: with a total charge, which couples all points.
-    """
-
-    __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
-        *("potential", "elements", "factor", "spring", "_forces", "_densities", "_band", "_negative", "_known"),
-    )
-
-    def __init__(
-        self,
-        x: Array,
-        elastic_energy: float,
-        magnetic_energy: float,
-        volume: float,
-        finite: bool,
-        forces: Array,
-        densities: Array,
-        potential: Potential,
-        elements: Elements,
-        factor: float,
-        spring: Array | None = None,
-    ) -> None:
-        self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
-        self.spring = spring
-        self._band: Array | None = None
-        self._negative: int | None = None
-        self._known: dict[str, float] | None = None
-
-    @property
-    def force_density(self) -> Array:
-        """The integrands of the two gradients, shape (8, n_points), by which a residual is judged."""
-        return self._densities[:N_FORCE]
-
-    @property
-    def stiffness_density(self) -> Array:
-        """What :attr:`band` integrates, shape (10 n_quadrature, n_elements)."""
-        return self._densities[N_FORCE : N_FORCE + N_STIFFNESS].reshape(-1, self.potential.space.n_elements)
-
-    @property
-    def stress(self) -> Array:
-        """Principal mechanical stresses at the quadrature points, shape (2, n_points)."""
-        return self._densities[N_FORCE + N_STIFFNESS :]
-
-    @property
-    def gradient(self) -> Array:
-        return self._forces[0]
-
-    @property
-    def volume_gradient(self) -> Array:
-        return self._forces[1]
-
-    @property
-    def unbalanced(self) -> Array:
-        return self._forces[2]
-
-    def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
-        """A number that belongs to this state, computed when first asked for under its name."""
-        known = self._known
-        if known is None:
-            known = self._known = {}
-        value = known.get(name)
-        if value is None:
-            value = known[name] = compute(self)
-        return value
-
-    @property
-    def band(self) -> Array:
-        """E'' - P V'' in LAPACK band storage, shape (3 kd + 1, n_free), less what the :attr:`spring` adds: assembled when first asked for,
-        as not every state needs it.
-        """
-        if self._band is None:
-            self._band = self.elements.assemble(self._densities)
-        return self._band
-
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues of E'' - P V'': counted once, as two neighbouring steps of a branch ask for it."""
-        if self._negative is None:
-            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, self.spring, 1.0)
-        return self._negative
-
-    def factors(self) -> Factor:
-        """Factors of E'' - P V''."""
-        factor = kernels().factor(self.band)
-        return factor if self.spring is None else SpringFactor(factor, self.spring)
-
-    def carried(self, v: Array) -> Array:
-        """See :meth:`Potential.carried`."""
-        return self.potential.carried(v)
-
-    def brought(self, v: Array) -> Array:
-        """See :meth:`Potential.brought`; without what bodies keep from moving."""
-        return self.potential.brought(v)
-
-    def row(self, row: Array) -> Array:
-        """See :meth:`Potential.row`."""
-        return self.potential.row(row)
-
-    def released(self) -> Evaluation | None:
-        """The same state without the nodes that bodies hold by no force; None where there are none."""
-        return None
-
-    def holds(self, unknown: int) -> bool:
-        """Whether a body keeps an unknown from changing."""
-        return False
-
-    def reduced(self, v: Array) -> Array:
-        """A vector, or columns, in the unknowns of :attr:`band`: the same one, unless bodies hold nodes."""
-        return v
-
-    def expanded(self, v: Array) -> Array:
-        """The displacement of a vector in the unknowns of :attr:`band`."""
-        return v
-
-    def reduced_mass(self, mass: Array) -> Array:
-        """A mass matrix in the unknowns of :attr:`band`."""
-        return mass
-
-    def inner(self, x: Array, y: Array) -> float:
-        """x . (E'' - P V'') y."""
-        own = kernels().inner(self.band, self.potential.space.half_bandwidth, x, y)
-        return own if self.spring is None else own + float(self.spring @ x) * float(self.spring @ y)
-
-    def border(self, row: Array, corner: float) -> Border:
-        """Factors of :attr:`band` with the column -V' and the row of a control."""
-        if self.spring is not None:
-            return BorderedFactor(self.factors(), -self.volume_gradient, row, corner)
-        return self.elements.border(self._densities, self.volume_gradient, row, corner)
-
-    def step(self, row: Array, corner: float, gap: float) -> Step:
-        """The bordered Newton step at x and its factors, see :meth:`.Elements.step`."""
-        if self.spring is not None:
-            border, largest = self.border(row, corner), self.elements.largest
-            dx, dp = border.solve(self.unbalanced, -gap)
-            return border, dx, dp, largest(dx), largest(self.x)
-        return self.elements.step(self._densities, self._forces, row, corner, gap, self.x)
-
-    def force_scale(self, pressure: float) -> tuple[float, float]:
-        """Sum of the absolute forces that meet at the nodes, largest for u and for w."""
-        return self.elements.force_scale(self._densities, pressure)
-
-    def form_parts(self, mode: Array) -> tuple[float, float]:
-        """Of the integrand of mode . (E'' - P V'') mode, less what the :attr:`spring` adds: see :meth:`.Elements.form_parts`. The weights
-        are those of the highest polynomial that the quadrature points of an element tell apart.
-        """
-        return self.elements.form_parts(self._densities, np.ascontiguousarray(mode), self.potential.space.highest)
-
-    @property
-    def load_energy(self) -> float:
-        """Energy of the loads at x: computed only when asked for, as no solver needs it."""
-        return self.potential.load_energy(self.x, self.factor)
-
-    @property
-    def electric_energy(self) -> float:
-        """Energy of voltage or charge at x, with the 2 pi; computed when asked for."""
-        return self.potential.electric_energy(self.x, self.factor)
-
-    @property
-    def energy(self) -> float:
-        return self.elastic_energy + self.magnetic_energy + self.load_energy + self.electric_energy
-
-    @property
-    def energy_size(self) -> float:
-        """Sum of the sizes of all energies: what an error of their sum is compared with."""
-        return abs(self.elastic_energy) + abs(self.magnetic_energy) + abs(self.load_energy) + abs(self.electric_energy)
-
-
-class Potential:
+class Potential(PointTerms):
     """Discrete potential of a scene.
 
     Parameters
@@ -262,7 +78,7 @@ class Potential:
             else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch, nodal)
         )
         if borders := getattr(scene, "borders", ()):
-            self.space = self.space.with_moved(borders)
+            self.space = self.space.with_moved(borders, alone=bool(scene.bodies))
         space = self.space
         self.sheet = Sheet.of(scene)
         if not space.n_free:
@@ -335,16 +151,6 @@ class Potential:
         """The potential on the mesh of the scene: this one, unless ends of elements follow borders."""
         return self
 
-    @property
-    def surrounded(self) -> bool:
-        """Whether anything but the pressure acts on the membrane. Otherwise the flat unloaded state is an equilibrium without stiffness."""
-        return bool(self.sources or self.loads or self.electric)
-
-    @property
-    def prestressed(self) -> bool:
-        """Whether the material has stress at rest, which holds no equilibrium in a curved membrane."""
-        return bool(getattr(self.scene.material, "prestressed", False))
-
     @cached_property
     def linear(self) -> bool:
         """Whether forces at a state are linear in the factor on sources and loads: those of a charge on electrodes are not, nor where the
@@ -356,11 +162,6 @@ class Potential:
         ahead = 1.0 if self.linear else _LITTLE_AHEAD  # where it is linear that is exact
         difference: Array = self.evaluate(evaluation.x, pressure, factor + ahead).gradient - evaluation.gradient
         return difference / ahead
-
-    @cached_property
-    def electric(self) -> Electric | None:
-        """Voltage or charge of the scene without units; None without."""
-        return self.scene.electricity
 
     def square(self, x: Array, factor: float = 1.0) -> float | None:
         """phi^2, or the frozen q^2, of a state; None without voltage and charge. ``factor`` as in :meth:`evaluate`."""
@@ -570,130 +371,3 @@ class Potential:
     def force_scale(self, evaluation: Evaluation, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w: what a residual is to be compared with."""
         return evaluation.force_scale(pressure)
-
-    def response(self, e1: Array, e2: Array, square: Array | None = None) -> Array:
-        """Principal stresses that the energy feels and their derivatives with respect to the Hencky strains, where the modulus is 1.
-
-        Parameters
-        ----------
-        e1, e2 : ndarray
-        square : ndarray, optional
-            :meth:`local_square` at the points, with voltage or charge.
-
-        Returns
-        -------
-        ndarray, shape (5, n)
-            s_1, s_2, ds_1/de_1, ds_1/de_2, ds_2/de_2 in units of mu.
-        """
-        return at_points(self._response_function, e1, e2, *([] if square is None else [square]))
-
-    @cached_property
-    @BUILDING
-    def _response_function(self) -> ca.Function:
-        e = ca.SX.sym("e", 2 if self.electric is None else 3)
-        with casadi_answers_numpy():
-            response = response_of(self.scene, None if self.electric is None else e[2])
-            stress, tangent = response_expressions(response, e)
-        return point_rows([e], [stress, tangent[0, 0], tangent[0, 1], tangent[1, 1]])
-
-    def field_energy(self, rho: Array, eta: Array) -> Array:
-        """Energy density of sources and loads per reference area and its derivatives with respect to the position.
-
-        Returns
-        -------
-        ndarray, shape (6, n)
-            m, m_rho, m_eta, m_rho_rho, m_rho_eta, m_eta_eta in units of mu T, where the thickness is 1; zeros without sources and loads.
-            A magnetic energy that depends on the slope is not part of it, see :meth:`wave_energy`.
-        """
-        if not self.surrounded:
-            return np.zeros((6, np.size(rho)))
-        return at_points(self._field_energy_function, rho, eta)
-
-    @cached_property
-    @BUILDING
-    def _field_energy_function(self) -> ca.Function:
-        y = ca.SX.sym("y", 2)
-        with casadi_answers_numpy():
-            density = over_reference(self.loads, y[0], y[1]) + ca.SX(0)
-            near, scene = Nearby(self.sources, y[0], y[1]), self.scene
-            if self.sources and not self.tilts:
-                density += position_energy_density(near.sources, scene.susceptibility or 0.0, scene.saturation, y[0], y[1])
-            hessian, gradient = ca.hessian(density, y)
-            density, gradient, hessian = near.placed(density, gradient, hessian)
-        return point_rows([y], [density, gradient, hessian[0, 0], hessian[0, 1], hessian[1, 1]])
-
-    @property
-    def field_operations(self) -> int:
-        """Number of elementary operations of :meth:`field_energy` at one point."""
-        return int(self._field_energy_function.n_instructions())
-
-    @property
-    def tilts(self) -> bool:
-        """Whether the magnetic energy depends on the slope of the meridian."""
-        return self.magnetisation is not None and self.magnetisation.tilts
-
-    def wave_energy(self, rho: Array, eta: Array, slopes: tuple[Array, Array], R: Array, Z: Array, s: Array) -> Array | None:
-        """Second derivatives of a magnetic energy that depends on the slope, see :func:`.magnetic.wave_function`; None without one.
-
-        Parameters
-        ----------
-        rho, eta, slopes : ndarray
-            Position and its derivatives with respect to the arc length of the reference meridian.
-        R, Z, s : ndarray
-            Reference meridian.
-
-        Returns
-        -------
-        ndarray, shape (25, n)
-            In units of mu T, where the thickness is 1.
-        """
-        if not self.tilts:
-            return None
-        remanence = remanence_column(self.magnetisation, R, Z, s, self.space.side)
-        return at_points(self._wave_function, rho, eta, *slopes, R, np.zeros_like(rho) if remanence is None else remanence)
-
-    @cached_property
-    @BUILDING
-    def _wave_function(self) -> ca.Function:
-        with casadi_answers_numpy():
-            return wave_function(cast(Magnetisation, self.magnetisation), self.sources)
-
-
-def potential_of(scene: Scene) -> Potential:
-    """The potential of a scene, built once: scenes that differ only in what is done with it share one.
-
-    Raises
-    ------
-    InputError
-        While the mesh of the scene is still to be chosen.
-    """
-    require_elements(scene)
-    return _potential_of(_plain(scene))
-
-
-@lru_cache(maxsize=256)
-def _plain(scene: Scene) -> Scene:
-    """The scene without what makes no difference to its potential."""
-    electric = scene.electricity
-    if electric is None and scene.electric is not None and scene.electric.ends:  # elements end there
-        electric = scene.electric.plain(scene.scales)
-    ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
-    plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
-    return scene.replace(title="", follow_zones=scene.follows_zones, run=None, analysis=type(scene.analysis)(), **plain)
-
-
-def require_elements(scene: Scene) -> None:
-    if scene.open:
-        accuracy = getattr(scene.mesh, "accuracy", None)
-        advice = "no mesh is chosen for it here; give elements and degree, or the scene of a branch from inflate, pressurize, trace or run"
-        raise InputError("mesh.accuracy", accuracy, advice)
-
-
-@lru_cache(maxsize=64)
-def _potential_of(scene: Scene) -> Potential:
-    if not scene.follows:
-        return Potential(scene)
-    from .contact import ContactPotential
-    from .following import WrinklingPotential
-
-    return ContactPotential(scene) if scene.bodies else WrinklingPotential(scene)

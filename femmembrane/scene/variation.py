@@ -431,20 +431,8 @@ def _named(scene: Scene, name: str) -> Parameter:
 
 def _parts(scene: Scene) -> SimpleNamespace:
     """The parts of a scene that formulas use."""
-    kept = (
-        "mesh",
-        "degree",
-        "tension_field",
-        "thickness",
-        "modulus",
-        "prestretch",
-        "element_ends",
-        "follows",
-        "material",
-        "sources",
-        "loads",
-    )
-    found = {name: getattr(scene, name) for name in ("susceptibility", "electricity", *MAGNETISATION, *kept)}
+    kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", "material", "sources", "loads")
+    found = {name: getattr(scene, name) for name in ("follows", "susceptibility", "electricity", *MAGNETISATION, *kept)}
     return SimpleNamespace(**found)
 
 

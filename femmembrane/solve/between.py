@@ -16,10 +16,11 @@ import numpy as np
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Potential
 from .banded import BandFactor, BorderedFactor
+from .bare import moderate
 from .branch import BranchProblem, corrected
 from .continuation import StepControl, Tracer, trace_points
 from .controls import CONTROLS
-from .start import moderate, start_at_volume
+from .start import start_at_volume
 from .state import Predictor, State, hermite, joined, rests_flat
 
 #: what a node knows of its place, in this order

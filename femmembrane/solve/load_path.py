@@ -9,13 +9,14 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
+from .bare import moderate
 from .continuation import BranchPoint
 from .controls import CONTROLS, Controlled
 from .minimize import is_minimum, minimize_and_verify
 from .newton import TOLERANCE, correct
 from .search import Limit, beyond_crossing, beyond_limit, loss_before
 from .segment import ON_FOLD, Located
-from .start import cold_start, moderate, start_at_volume
+from .start import cold_start, start_at_volume
 from .state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from .state_resolution import refuse_unresolved
 from .stepping import Corrector, march

@@ -26,6 +26,7 @@ from scipy.optimize import brentq
 from ..errors import SolveError, Status
 from ..potential import Array, Family
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
+from .bare import moderate
 from .branch import AT_CROSSING, FOLDS, BranchProblem
 from .continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, GasOver, PressureControl, at_number
@@ -33,7 +34,6 @@ from .newton import TOLERANCE, relative_residual, relative_size
 from .search import FAR, Limit
 from .segment import Located, Segment
 from .special_points import branch_point
-from .start import moderate
 from .state import Predictor, State
 from .stepping import control_rate
 from .wellposed import ill_posed

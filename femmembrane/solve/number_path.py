@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ..errors import SolveError, Status
 from ..potential import Family, Potential, potential_of
+from .bare import moderate
 from .branch import BranchProblem, first_point
 from .controls import ArcLengthControl, Control, Controlled, GasOver, at_number, is_held
 from .load_path import SOLVERS, LoadPath, NumberTurn, Turn
@@ -15,7 +16,6 @@ from .newton import correct
 from .number_curve import ControlledProblem, NumberPoint, beyond_turn, first_controlled
 from .search import FAR, follow
 from .segment import Located
-from .start import moderate
 from .state import Predictor, State
 from .state_resolution import refuse_unresolved
 from .stepping import march

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
+from .bare import moderate
 from .branch import FOLDS, BranchProblem, first_point
 from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, VolumeControl
@@ -18,7 +19,7 @@ from .guess import guess_at_volume
 from .newton import TOLERANCE, Equations, correct, displaced, relative_size
 from .segment import Located, Segment
 from .special_points import branch_points, branches_crossing
-from .start import moderate, start_at_volume
+from .start import start_at_volume
 from .state import Predictor, State, at_rest, displacement, distance, flat_state
 from .state_resolution import unresolved
 from .switching import SAME_CROSSING, Crossing, crossing_at, points_beyond, same_crossing, softest

@@ -2,8 +2,8 @@
 
 One way for every shape, support, material, source, load and control. Its parts are three, each with bounded work:
 
-1. *A bare membrane at a volume*, without sources and loads, which at rest nothing holds: a guess that encloses the volume, solved by
-   Newton's method, by going downhill, or held in its place by dead forces that fade out (:mod:`.homotopy`), whichever arrives first.
+1. *A bare membrane at a volume*, without sources and loads, which at rest nothing holds (:mod:`.bare`): a guess that encloses the volume,
+   solved by Newton's method, by going downhill, or held in its place by dead forces that fade out, whichever arrives first (:mod:`.ways`).
 2. *Sources and loads turned on* there, at constant volume, along the path even where it turns back.
 3. *The branch through that state* to the load that is asked for, by arc length in both directions.
 
@@ -15,100 +15,28 @@ then the guess with all sources and loads at once. An error says what was tried;
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from functools import lru_cache
-from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from ..discretization.space import transferred
 from ..errors import SolveError, Status
-from ..potential import Potential, potential_of
+from ..potential import Potential
 from .banded import negative_among
-from .branch import BranchProblem, first_point
-from .contact import touches_source
-from .continuation import BranchPoint, StepControl, Tracer, trace_points
-from .controls import CONTROLS, Control, ControlKind, Controlled, Gas, PressureControl, VolumeControl
+from .bare import inflated, moderate, unloaded, usual_volume, without_load
+from .controls import CONTROLS, ControlKind, Controlled, Gas, VolumeControl
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
-from .minimize import minimize
 from .newton import NEGLIGIBLE, correct
-from .segment import Segment
-from .state import Predictor, State, at_rest, displacement, distance, flat_state
-from .state_resolution import unresolved
+from .state import State, at_rest, displacement, distance, flat_state
 from .stepping import march
-from .wellposed import ill_posed, is_slack, slackness, unresolved_source
+from .ways import CORRECTIONS, along, from_guess, sound, well_posed
 
-#: a moderately inflated membrane holds this much more than at rest, in units of its own size, or that part of it. Below, one with sources
-#: is reached from there: turning sources on at the flat state starts from a singular Hessian
-START_VOLUME, START_SHARE = 0.5, 0.12
 #: volume, in units of the membrane's own size, below which an equilibrium is looked for from the nearly flat side
 NEARLY_FLAT = 0.05
 #: distance to a source, over the size of the membrane, below which a start that fails has run into it
 NEAR = 0.2
-#: from this many times that volume a membrane is inflated further if a guess at the wanted volume is too far from its equilibrium
-SAFE = 20.0
-#: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
-HUGE = 1e12
 #: different states that the mesh does not resolve, after which no further way is tried; and how near they are if they are the same
 _COARSE, _SAME = 2, 1e-6
-#: times that a volume is divided by four until the membrane touches no body
-_QUARTERS = 60
-#: most steps along a branch in each direction, and corrections of a guess
-_STEPS, _CORRECTIONS = 300, 40
-
-
-if TYPE_CHECKING:
-    from ..potential.contact import ContactPotential
-
-
-def moderate(potential: Potential) -> float:
-    """By how much the volume of a moderately inflated membrane differs from that at rest; less where it would come to a body."""
-    space = potential.space
-    size = max(START_VOLUME * space.units["volume"], START_SHARE * abs(space.reference_volume))
-    return free_volume(cast("ContactPotential", potential), size) if potential.obstacles else size
-
-
-@lru_cache(maxsize=16)
-def free_volume(potential: ContactPotential, size: float) -> float:
-    """The largest of a volume, a quarter of it and so on that a membrane without sources holds on either side of rest without touching a
-    body; at last the smallest."""
-    bare, rest = potential.without_bodies, potential.space.reference_volume
-    for _ in range(_QUARTERS):
-        with suppress(SolveError):
-            if all(potential.touching(_inflated(bare, rest + side * size).x) > 0 for side in (1.0, -1.0)):
-                break
-        size /= 4
-    return size
-
-
-def unloaded(potential: Potential) -> State | None:
-    """The membrane without pressure, sources and loads, drawn out to where its ends are held.
-
-    None where they are held where they rest, where that state was not found, and where it is compressed: it is no place to start from.
-    """
-    state = _without_load(potential)
-    return state if state is not None and state.evaluation.stress[0].min() > 0 and _sound(state) else None
-
-
-def _without_load(potential: Potential) -> State | None:
-    """As :func:`unloaded`, whether it is compressed or not."""
-    if not potential.strained or potential.space.loose:
-        return None
-    control, x = PressureControl(0.0), np.zeros(potential.space.n_free)
-    result = correct(potential, control, x, 0.0, magnetic=0.0, damped=True, max_iterations=_CORRECTIONS)
-    if result.status is Status.CONVERGED:
-        return State.of(result)
-    return follow_homotopy(Held(potential, control, x, 0.0, magnetic=0.0), x, 0.0)
-
-
-def usual_volume(potential: Potential) -> float:
-    """The volume from which a branch is followed when no other is asked for.
-
-    It is that under tension without load, where the places of the ends stretch the membrane, else that of the moderately inflated one.
-    """
-    drawn = unloaded(potential)
-    return potential.space.reference_volume + moderate(potential) if drawn is None else drawn.volume
 
 
 def cold_start(potential: Potential, held: Controlled, load: float, *, stable: bool = True) -> State:
@@ -128,7 +56,7 @@ def cold_start(potential: Potential, held: Controlled, load: float, *, stable: b
     SolveError
         When none of the ways arrives.
     """
-    if not potential.surrounded and (state := _without_load(potential)) is not None and state.value_of(held) == load:
+    if not potential.surrounded and (state := without_load(potential)) is not None and state.value_of(held) == load:
         return state  # under tension as any other; one that is compressed is what there is without load
     if isinstance(held, Gas):
         return start_in_gas(potential, held.at(load))
@@ -148,11 +76,13 @@ def start_at_volume(potential: Potential, volume: float) -> State:
     if at_rest(potential, CONTROLS["volume"], volume):
         return flat_state(potential)
     if not potential.surrounded:
-        return _inflated(potential, volume)
+        return inflated(potential, volume)
     return _first_of(_ways_to_volume(potential, volume), f"V = {volume:.6g}")
 
 
 Way = Callable[[], State | None]
+
+
 _GUESS = "a guess"
 
 
@@ -178,10 +108,10 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
             continue
         if state is None or any(_same(state, other) for other in lost):
             continue
-        if _sound(state):
+        if sound(state):
             return state
         spare = spare or state
-        lost += [state] * _well_posed(state)
+        lost += [state] * well_posed(state)
     if spare is not None:
         return spare
     order = [Status.SLACK, Status.LEGENDRE_FAILURE, Status.DIPOLE_CONTACT]
@@ -224,9 +154,9 @@ def _ways_to_volume(potential: Potential, volume: float) -> Iterator[tuple[str, 
         for first in (rest + side * size for side in _sides(volume - rest)):
             yield (
                 f"the branch from V = {first:.6g}",
-                lambda first=first: _along(potential, _with_fields(potential, first), CONTROLS["volume"], volume),  # type: ignore[misc]
+                lambda first=first: along(potential, _with_fields(potential, first), CONTROLS["volume"], volume),  # type: ignore[misc]
             )
-    yield f"{_GUESS} there", lambda: _from_guess(potential, VolumeControl(volume), volume)
+    yield f"{_GUESS} there", lambda: from_guess(potential, VolumeControl(volume), volume)
 
 
 def _sides(load: float) -> tuple[float, float]:
@@ -241,11 +171,11 @@ def _along_volume(potential: Potential, first: float, volume: float) -> State:
 
 def _with_fields(potential: Potential, volume: float) -> State:
     """The bare membrane at a volume, and its sources and loads turned on there."""
-    bare = _inflated(potential, volume)
+    bare = inflated(potential, volume)
     control = VolumeControl(volume)
     if potential.space.loose:  # nothing else holds it along the axis: they cannot be turned on slowly
         x = bare.x if bare.evaluation.potential is potential else transferred(bare.evaluation.potential.space, bare.x, potential.space)
-        result = correct(potential, control, x, bare.pressure, damped=True, max_iterations=_CORRECTIONS)
+        result = correct(potential, control, x, bare.pressure, damped=True, max_iterations=CORRECTIONS)
         state = State.of(result) if result.status is Status.CONVERGED else None
         if state is None:
             state = follow_homotopy(Held(potential, control, x, bare.pressure), x, bare.pressure)
@@ -276,139 +206,6 @@ def _acting(potential: Potential) -> str:
         return "the sources"
     word = "voltage" if potential.electric.load == "voltage" else "charge"
     return f"the sources and the {word}" if potential.sources else f"the {word}"
-
-
-def _inflated(potential: Potential, volume: float) -> State:
-    """Equilibrium without sources and loads; of a potential without them where only they would hold the membrane along the axis."""
-    if potential.space.loose:
-        potential = potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
-    rest = potential.space.reference_volume
-    if potential.obstacles:
-        return _inflated_to_bodies(cast("ContactPotential", potential), volume)
-    if volume == rest and not (potential.flat or potential.strained):
-        return flat_state(potential, magnetic=0.0)
-    if (drawn := unloaded(potential)) is not None and (state := _drawn_to(potential, drawn, volume)) is not None:
-        return state
-    if not (potential.flat or potential.space.lids) and volume * rest < 0:
-        return _mirrored(potential, _inflated(potential, -volume), volume)
-    failure = spare = None
-    for share in _shares(potential, abs(volume - rest)):
-        first = rest + share * (volume - rest)
-        state = _from_guess(potential, VolumeControl(first), first, magnetic=0.0)
-        if state is not None and not (_sound if first == volume else _well_posed)(state):
-            spare, state = (spare or state) if first == volume else spare, None
-        if state is None:
-            continue
-        if first == volume:
-            return state
-        try:
-            return march(potential, state, VolumeControl, first, volume, magnetic=0.0)[-1]
-        except SolveError as error:
-            failure = failure or error
-        bare = potential if not potential.surrounded else potential_of(potential.scene.replace(sources=(), loads=(), scales=None))
-        there = state if bare is potential else _moved(bare, state, first)
-        found = None
-        if there is not None:
-            with suppress(SolveError):
-                found = _along(bare, there, CONTROLS["volume"], volume)
-        if found is not None:
-            back = correct(potential, VolumeControl(volume), found.x, found.pressure, magnetic=0.0, damped=True)
-            if back.status is Status.CONVERGED:
-                return State.of(back)
-    if spare is not None:
-        return spare
-    why = failure or "no guess led to an equilibrium"
-    status = failure.status if failure else Status.NOT_CONVERGED
-    raise SolveError(f"the membrane could not be inflated to V = {volume:.6g} without sources and loads: {why}", status=status)
-
-
-def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
-    """A membrane without sources and loads that came to a volume from where it touched no body."""
-    rest, bare = potential.space.reference_volume, potential.without_bodies
-    first = volume
-    for _ in range(_QUARTERS):
-        state = None
-        with suppress(SolveError):
-            state = _inflated(bare, first)
-        if state is not None and potential.touching(state.x) > 0:
-            break
-        if first == rest:
-            raise SolveError("the membrane without load touches a body", status=Status.NO_EQUILIBRIUM)
-        first = rest + (first - rest) / 4
-    else:
-        raise SolveError("no inflated membrane was found that touches no body", status=Status.NO_EQUILIBRIUM)
-    control = VolumeControl(first)
-    result = correct(potential, control, state.x, state.pressure, magnetic=0.0)
-    if result.status is not Status.CONVERGED:
-        raise SolveError(f"the membrane that touches no body at V = {first:.6g} was not found again", status=result.status)
-    found = State.of(result, state.iterations)
-    return found if first == volume else march(potential, found, VolumeControl, first, volume, magnetic=0.0)[-1]
-
-
-def _drawn_to(potential: Potential, drawn: State, volume: float) -> State | None:
-    """A bare membrane under tension led from no load to a volume; None where that leads to no sound state."""
-    if volume == drawn.volume:
-        return drawn
-    try:
-        state = march(potential, drawn, VolumeControl, drawn.volume, volume, magnetic=0.0)[-1]
-    except SolveError:
-        return None
-    return state if _sound(state) else None
-
-
-def _mirrored(potential: Potential, state: State, volume: float) -> State:
-    """A bare membrane whose ends are in the plane z = 0 turned inside out: no stretch changes when its shape is mirrored in that plane."""
-    space, w = potential.space, potential.space.fields[1]
-    _, Z = space.mesh.position(space.interpolation_points())
-    height = space.interpolate(np.zeros_like(Z), Z)
-    x = state.x.copy()
-    x[w] = -x[w] - 2 * height[w]
-    result = correct(potential, VolumeControl(volume), x, -state.pressure, magnetic=0.0, damped=True)
-    if result.status is not Status.CONVERGED:
-        raise SolveError(f"the membrane could not be turned inside out to V = {volume:.6g}", status=result.status)
-    return State.of(result)
-
-
-def _moved(onto: Potential, state: State, volume: float) -> State | None:
-    result = correct(onto, VolumeControl(volume), state.x, state.pressure, damped=True)
-    return State.of(result) if result.status is Status.CONVERGED else None
-
-
-def _shares(potential: Potential, excess: float) -> Iterator[float]:
-    """Shares of the way from rest at which a guess is tried: the whole, then from that to a safely inflated membrane down, then beyond."""
-    yield 1.0
-    safe = min(1.0, SAFE * moderate(potential) / excess) if excess else 1.0
-    if safe < 1:
-        yield safe
-    yield from (safe / 4**k for k in range(1, 6))
-    yield from (4.0, 16.0)  # where a tension field is taut
-
-
-def _from_guess(
-    potential: Potential,
-    control: Control,
-    volume: float,
-    *,
-    pressure: float = 0.0,
-    magnetic: float = 1.0,
-    accept: Callable[[State], bool] | None = None,
-) -> State | None:
-    """An equilibrium under a control from the guess at a volume: by Newton's method, or held by dead forces that fade out.
-
-    Without sources and loads (``magnetic=0.0``) the way downhill is tried between the two; with them it may end in a singularity.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):  # a guess may be too large or small for its energy to be a number: not converged
-        guess = guess_at_volume(potential, volume)
-        if not np.isfinite(potential.evaluate(guess, pressure, magnetic).gradient).all():
-            return None
-        result = correct(potential, control, guess, pressure, magnetic=magnetic, damped=True, max_iterations=_CORRECTIONS)
-        if result.status is not Status.CONVERGED and not magnetic:
-            found, p, _, _ = minimize(potential, control, guess, pressure, magnetic=magnetic)
-            if np.isfinite(found).all() and np.isfinite(p):
-                result = correct(potential, control, found, p, magnetic=magnetic)
-        if result.status is Status.CONVERGED and (accept is None or accept(State.of(result))):
-            return State.of(result)
-        return follow_homotopy(Held(potential, control, guess, pressure, magnetic=magnetic), guess, pressure, accept=accept)
 
 
 # --- other loads than a volume: the branch through a state at a volume leads there
@@ -443,7 +240,7 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
     spare = None
     try:
         spare = _first_of(_ways_from(potential, held, pressure, size, sides, _is_minimum), f"P = {pressure:.9g} that is stable")
-        if stable or _sound(spare):
+        if stable or sound(spare):
             return spare
     except SolveError:
         if stable:
@@ -454,7 +251,7 @@ def start_at_pressure(potential: Potential, pressure: float, *, stable: bool = T
         if spare is None:
             raise
         return spare
-    return spare if spare is not None and not _sound(found) else found
+    return spare if spare is not None and not sound(found) else found
 
 
 def start_at_height(potential: Potential, height: float) -> State:
@@ -492,13 +289,13 @@ def _ways_from(
     rest = potential.space.reference_volume
     if potential.strained:
         nearest = usual_volume(potential)
-        yield f"the branch through V = {nearest:.6g}", lambda: _along(potential, start_at_volume(potential, nearest), held, load, accept)
+        yield f"the branch through V = {nearest:.6g}", lambda: along(potential, start_at_volume(potential, nearest), held, load, accept)
     for share in (1.0, 10.0, 100.0):  # further out where the first branch ends, or takes too many steps
         for side in sides:
             first = rest + side * share * size
             yield (
                 f"the branch through V = {first:.6g}",
-                lambda first=first: _along(potential, start_at_volume(potential, first), held, load, accept),  # type: ignore[misc]
+                lambda first=first: along(potential, start_at_volume(potential, first), held, load, accept),  # type: ignore[misc]
             )
     pressure = load if held is CONTROLS["pressure"] else 0.0
     for side in sides:
@@ -506,96 +303,13 @@ def _ways_from(
             guess = rest + side * share * size
             yield (
                 f"{_GUESS} with V = {guess:.6g}",
-                lambda guess=guess: _from_guess(potential, held.at(load), guess, pressure=pressure, accept=accept),  # type: ignore[misc]
+                lambda guess=guess: from_guess(potential, held.at(load), guess, pressure=pressure, accept=accept),  # type: ignore[misc]
             )
-
-
-def _along(
-    potential: Potential, state: State, held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None = None
-) -> State | None:
-    """The first state at a load, that will do, on the branch through a state; None if there is none within the bounds."""
-    point = first_point(potential, state, 1)
-    rises = (load - state.value_of(held)) * point.rate_of(held) >= 0
-    failure = None
-    for direction in (1, -1) if rises else (-1, 1):
-        try:
-            found = _first_met(potential, first_point(potential, state, direction), held, load, accept)
-        except SolveError as error:
-            failure = failure or error
-            continue
-        if found is not None:
-            return found
-    if failure is not None:
-        raise failure
-    return None
-
-
-def _first_met(
-    potential: Potential, point: BranchPoint, held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None
-) -> State | None:
-    if point.state.value_of(held) == load and (accept is None or accept(point.state)):
-        return point.state
-    space = potential.space
-    away = np.inf if potential.strained else abs(point.state.volume - space.reference_volume) / space.units["volume"]
-    control = StepControl(largest=np.inf)  # as long as the deviation allows: nobody draws this branch
-    tracer = Tracer(Predictor(), control.first * min(1.0, np.sqrt(away)), control)
-    problem, spare = BranchProblem(potential), None
-    for _, new in zip(range(_STEPS), trace_points(problem, point, tracer), strict=False):
-        for state in _met(Segment(problem, point, new), held, load, accept):
-            if _well_posed(state):
-                return state
-            spare = spare or state
-        if is_slack(potential, new.state):
-            raise slackness(potential, new.state)
-        touching = touches_source(potential.distance_to_sources(new.state.x), potential.space.unit)
-        if touching or unresolved_source(potential, new.state.x):
-            raise SolveError(f"the branch runs into a source at V = {new.state.volume:.6g}", status=Status.DIPOLE_CONTACT)
-        point = new
-        size = problem.norm(new.z)
-        if size > HUGE:
-            return spare
-        tracer.step = min(tracer.step, StepControl.largest * (1 + size))  # in proportion to the membrane
-    return spare
-
-
-def _met(segment: Segment[BranchPoint], held: ControlKind | Gas, load: float, accept: Callable[[State], bool] | None) -> Iterator[State]:
-    """States at the load on a segment that will do."""
-    if isinstance(held, Gas):
-        yield from _gas_met(segment, held)
-        return
-    for met in segment.crossings(held.name, load):
-        # at the limit point itself round-off has the sign of the smallest eigenvalue: there the side that is stable says it
-        at_limit = held is CONTROLS["pressure"] and any(met is fold.point for fold in segment.folds("limit_point"))
-        judged = (segment.a, segment.b) if at_limit else (met,)
-        if accept is None or any(accept(p.state) for p in judged):
-            yield met.state
-
-
-def _gas_met(segment: Segment[BranchPoint], gas: Gas) -> Iterator[State]:
-    """The state at the amount of a gas between two points of a branch, both of which compress it."""
-    ends = (segment.a, segment.b)
-    missing = [point.state.value_of(gas) - gas.amount for point in ends]
-    if missing[0] * missing[1] > 0 or any(point.state.volume <= -gas.chamber for point in ends):
-        return
-    share = missing[0] / (missing[0] - missing[1])
-    near = segment.at(share) if 0 < share < 1 else segment.b
-    result = correct(segment.problem.potential, gas, near.state.x, near.state.pressure, damped=True)
-    if result.status is Status.CONVERGED:
-        yield State.of(result)
-
-
-def _well_posed(state: State) -> bool:
-    return ill_posed(state.evaluation.potential, state.evaluation) is None
 
 
 def _same(a: State, b: State) -> bool:
     potential = a.evaluation.potential
     return a.x.shape == b.x.shape and distance(potential, a.x, b.x) <= _SAME * displacement(potential, a.x)
-
-
-def _sound(state: State) -> bool:
-    """Whether a state is that of a membrane: well-posed, and not one of its mesh only."""
-    return _well_posed(state) and not unresolved(state.evaluation.potential.root, state)
 
 
 def _is_minimum(state: State) -> bool:

@@ -16,9 +16,9 @@ from ..results.convergence import COMPARED, PROFILES, ROUND_OFF, Convergence
 from ..results.equilibrium import Equilibrium
 from ..scene import MAX_DEGREE, Scene
 from ..scene.run import GAS
+from ..solve.bare import usual_volume
 from ..solve.controls import CONTROLS, Control, control_kind
 from ..solve.newton import correct
-from ..solve.start import usual_volume
 from ..solve.state import State
 from ..threads import one_thread
 from .arguments import check_increasing, check_scene

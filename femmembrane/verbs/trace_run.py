@@ -21,6 +21,7 @@ from ..scene import ALL, Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
 from ..solve.active_set import contact_events
+from ..solve.bare import usual_volume
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
@@ -28,7 +29,7 @@ from ..solve.controls import CONTROLS, check_height
 from ..solve.finer_space import met_across
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
-from ..solve.start import start_at_volume, usual_volume
+from ..solve.start import start_at_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
 from ..solve.zone_events import ZoneEvent, zone_events

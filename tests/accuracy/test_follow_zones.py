@@ -81,21 +81,20 @@ def test_a_run_goes_on_to_the_bit_where_it_was_interrupted():
     assert again[-1].scene == whole[-1].scene
 
 
-def test_a_trace_keeps_its_identity():
-    """Steps and special points are those of the branch on its own mesh; what is recorded lies on the borders."""
-    scene = following(8, 3)
-    asked = {"start": 0.06, "until": {"center_height": -0.2}, "direction": -1}
+def test_a_branch_is_followed_on_its_borders():
+    """By arc length, with longer steps than where borders pass through elements; it goes on to the bit."""
+    scene = following(16, 6)
+    asked = {"start": 0.5, "until": {"center_height": -0.45}, "direction": -1}
     plain, branch = (fm.trace(each, **asked) for each in (scene.replace(follow_zones=False), scene))
     assert branch.status is fm.Status.CONVERGED
-    assert np.array_equal([eq.of_branch.pressure for eq in branch], plain.pressure)
-    assert [p.pressure for p in branch.special_points] == [p.pressure for p in plain.special_points]
-    assert branch[-1].center_height == pytest.approx(-0.2, rel=1e-12)
-    assert branch[-1].pressure == pytest.approx(DISC[-0.2].pressure, rel=2e-5)
+    assert len(branch) < 0.5 * len(plain)
+    assert branch[-1].center_height == pytest.approx(-0.45, rel=1e-12)
+    assert branch[-1].pressure == pytest.approx(DISC[-0.45].pressure, rel=1e-8)  # the height of a pole is less exact than a volume
     wrinkled = [eq for eq in branch if len(eq.zones("mechanical")) > 1]
     assert len(wrinkled) > 2
     assert all(set(eq.zones("mechanical").borders) <= set(eq.potential.space.ends) for eq in wrinkled)
-    half = fm.trace(scene, start=0.06, direction=-1, max_steps=len(branch) // 2)
-    again = fm.trace(scene, start=half, until={"center_height": -0.2})
+    half = fm.trace(scene, start=0.5, direction=-1, max_steps=len(branch) - 3)
+    again = fm.trace(scene, start=half, until={"center_height": -0.45})
     assert np.array_equal(again[-1].state, branch[-1].state)
     assert again[-1].scene == branch[-1].scene
     assert branch.at(volume=0.02, refine=True).volume == pytest.approx(0.02, rel=1e-12)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.potential import Potential, potential, template
+from femmembrane.potential import Potential, of_scene, potential, template
 from femmembrane.potential.expressions import point_expressions
 from femmembrane.solve.guess import spherical_dome
 from tests.cases import OGDEN, disc_scene
@@ -33,7 +33,7 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[object]]:
 
 def forget() -> None:
     template._template.cache_clear()
-    potential._potential_of.cache_clear()
+    of_scene._potential_of.cache_clear()
 
 
 def values(scene: fm.Scene) -> list[np.ndarray]:

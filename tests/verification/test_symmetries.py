@@ -183,11 +183,11 @@ def test_repeated_runs_are_identical(solver):
 
 def test_repeated_runs_are_identical_from_cold():
     """Also when the potential is built anew."""
-    from femmembrane.potential import potential
+    from femmembrane.potential import of_scene
 
     scene = disc_scene(dipole=BELOW, elements=16)
     first = fm.equilibrium(scene, volume=6.0)
-    potential._potential_of.cache_clear()
+    of_scene._potential_of.cache_clear()
     second = fm.equilibrium(scene, volume=6.0)
     assert first.potential is not None
     assert (first.pressure, first.energy) == (second.pressure, second.energy)

@@ -11,6 +11,8 @@ steps, arc length and predictions are measured there.
 
 from __future__ import annotations
 
+import copy
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self, cast
 
 import numpy as np
@@ -106,8 +108,45 @@ class FollowingPotential(Potential):
         return np.asarray(row @ self.to_root) if self.borders else row
 
 
+@dataclass(frozen=True)
+class Mark:
+    """A place of the meridian where elements end although no border is there: a zone of no width opens or closes in it.
+
+    Attributes
+    ----------
+    place : float
+    low, high : float
+        The part of the meridian about it in which there is no other border.
+    """
+
+    place: float
+    low: float
+    high: float
+
+
 class WrinklingPotential(FollowingPotential):
-    """The potential of a tension field whose elements end at the borders of its zones."""
+    """The potential of a tension field whose elements end at the borders of its zones, and at a mark if it has one."""
+
+    mark: Mark | None = None
+    _still = False
+
+    @property
+    def unsettled(self) -> bool:  # type: ignore[override]
+        return not self._still
+
+    @cached_property
+    def still(self) -> Self:
+        """The same potential, whose elements follow nothing."""
+        return self._copy(_still=True)
+
+    def marking(self, mark: Mark) -> Self:
+        """The same potential with a mark."""
+        return self._copy(mark=mark)
+
+    def _copy(self, **changes: object) -> Self:
+        made = copy.copy(self.root)
+        made.__dict__.update(changes, _moved={})
+        return made
 
 
 def interpolation(space: Space, onto: Space) -> sparse.csr_matrix:

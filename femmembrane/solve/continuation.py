@@ -27,8 +27,6 @@ CORNER = 100.0
 ROUND_OFF = 1e-14
 #: times the error of a point that a prediction from the points before may miss
 _BOTH_ENDS = 10.0
-#: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
-_MOVING = 0.02
 
 
 @dataclass(frozen=True)
@@ -115,6 +113,8 @@ class CurveProblem(ABC, Generic[Point]):
         Quantities of the curve with their units: an error is judged relative to the quantity and one unit.
     cornered : bool
         Whether the curve may have corners, which no shorter step makes round.
+    moving : float
+        What a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders.
     resolution : float
         Smallest change of a quantity, relative to its size, that is told from round-off; a fold within less is none.
     """
@@ -122,6 +122,7 @@ class CurveProblem(ABC, Generic[Point]):
     potential: Potential
     folds: Mapping[str, str]
     cornered: bool = False
+    moving: float = 0.0
     resolution: float = 0.0
 
     @property
@@ -253,7 +254,7 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
     if new.own is not None:
-        miss = max(miss - _MOVING, 0.0)
+        miss = max(miss - problem.moving, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)

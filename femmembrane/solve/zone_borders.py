@@ -27,7 +27,7 @@ from .end_strains import strains_at_ends
 from .zone_strains import HOOP, MERIDIAN, Strains
 
 if TYPE_CHECKING:
-    from ..potential.following import WrinklingPotential
+    from ..potential.following import Mark, WrinklingPotential
     from .newton import NewtonResult
 
 #: a move after which borders are at rest, over the length of the meridian: the next one would be smaller by some orders
@@ -59,18 +59,18 @@ def settled_zones(once: Once, control: Control, potential: Potential, x: Array, 
     result = once(given.root, control=control, x=given.carried(np.ascontiguousarray(x, dtype=float)), pressure=pressure)
     if result.status is not Status.CONVERGED:
         return result
-    followed = _with_borders(once, control, result)
+    followed = _with_borders(once, control, result, given.mark)
     if followed is None:
         return result
     followed.x = followed.evaluation.carried(followed.x)
     return followed
 
 
-def _with_borders(once: Once, control: Control, result: NewtonResult) -> NewtonResult | None:
+def _with_borders(once: Once, control: Control, result: NewtonResult, mark: Mark | None) -> NewtonResult | None:
     """The equilibrium with ends of elements at the borders of its zones; None where it has none, or they are not found."""
     spent = result.iterations
     for _ in range(_FRESH):
-        borders = ZoneBorders.of(Strains(result.evaluation))
+        borders = ZoneBorders.of(Strains(result.evaluation), mark)
         if borders is None:
             return None
         while True:
@@ -82,7 +82,7 @@ def _with_borders(once: Once, control: Control, result: NewtonResult) -> NewtonR
                 break
             if borders.rounds == _ROUNDS or not borders.move(result):
                 return None
-        if borders.explain(result):
+        if mark is not None or borders.explain(result):
             result.iterations = spent
             return result
     return None
@@ -93,7 +93,7 @@ def _solved(once: Once, control: Control, result: NewtonResult, borders: ZoneBor
     before = cast("WrinklingPotential", result.evaluation.potential)
     space = before.root.space
     try:
-        pairs = assigned_ends(space.ends, borders.places[borders.free], np.flatnonzero(~space.movable).tolist())
+        pairs = assigned_ends(space.ends, borders.ends, np.flatnonzero(~space.movable).tolist())
     except InputError:
         return None
     there = before.bordered(pairs)
@@ -119,23 +119,33 @@ class ZoneBorders:
     rounds : int
         How often they were moved.
     at_rest : bool
+    mark : Mark or None
+        Where elements end besides.
     """
 
-    def __init__(self, places: Array, free: NDArray[np.bool_], wrinkled: bool, length: float) -> None:
-        self.places, self.free, self.wrinkled, self.length = places, free, wrinkled, length
+    def __init__(self, places: Array, free: NDArray[np.bool_], wrinkled: bool, length: float, mark: Mark | None = None) -> None:
+        self.places, self.free, self.wrinkled, self.length, self.mark = places, free, wrinkled, length, mark
         self.rounds, self.at_rest = 0, not free.any()
         self._before: tuple[Array, Array] | None = None
 
     @classmethod
-    def of(cls, strains: Strains) -> ZoneBorders | None:
-        """Those of a state, without zones that are too narrow to count; None without borders, and where the membrane is slack."""
+    def of(cls, strains: Strains, mark: Mark | None = None) -> ZoneBorders | None:
+        """Those of a state, without zones that are too narrow to count; None without borders, and where the membrane is slack.
+
+        A zone that is marked is as good as none.
+        """
         screened = strains.screened
         if (screened[MERIDIAN] < 0).any():
             return None
         runs, length = strains.runs(HOOP), strains.last - strains.first
-        starts = [strains.first]
-        signs = [runs.signs[0]]
-        for place, sign in zip(runs.edges.tolist(), runs.signs[1:], strict=True):
+        edges, first = runs.edges, 0
+        if mark is not None:
+            within = (edges > mark.low) & (edges < mark.high)
+            first = int(within.sum()) if mark.low <= strains.first else 0
+            edges = edges[~within]
+        starts, signs = [strains.first], [runs.signs[first]]
+        for k, place in enumerate(edges.tolist()):
+            sign = signs[0] ^ (k % 2 == 0)
             if place - starts[-1] <= _NARROW * length:  # the zone before is too narrow
                 signs[-1] = sign
             else:
@@ -145,11 +155,17 @@ class ZoneBorders:
             starts.pop()
             signs.pop()
         kept = [k for k in range(1, len(starts)) if signs[k] != signs[k - 1]]
-        if not kept:
+        if not kept and mark is None:
             return None
         places, stay = np.array(starts)[kept], strains.space.ends[~strains.space.movable]
         free = np.abs(places[:, None] - stay).min(axis=1) > _THERE * length
-        return cls(places, free, signs[0], length)
+        return cls(places, free, signs[0], length, mark)
+
+    @property
+    def ends(self) -> Array:
+        """The places to which ends of elements are moved."""
+        own = self.places[self.free]
+        return own if self.mark is None else np.sort(np.append(own, self.mark.place))
 
     def move(self, result: NewtonResult) -> bool:
         """Move the free ones towards where their strains are zero; whether that could be done."""

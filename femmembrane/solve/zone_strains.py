@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..discretization.strains import strained_at
 from ..physics.kinematics import hencky_strains
@@ -16,6 +17,8 @@ MERIDIAN, HOOP = 0, 1
 BITS = (2, 1)
 #: points of each element at which strains are looked at; parts of an interval in which an extremum is closed in, and how often that is done
 _SAMPLES, _PARTS, _ZOOMS = 9, 24, 2
+#: part of an element next to a border that ends of elements follow, in which the sign of a strain is not looked at
+_BESIDE = 0.3
 #: strain over the largest one that is round-off
 _ROUND_OFF = 1e-11
 
@@ -50,6 +53,7 @@ class Strains:
         """The parts of the meridian where one of the strains keeps its sign, by its extrema to round-off."""
         ends = self.space.ends
         s = np.linspace(ends[:-1], np.append(np.nextafter(ends[1:-1], -np.inf), ends[-1]), _SAMPLES, axis=1).ravel()
+        s = s[~self._beside_borders(s)]
         g = self.at(s)[component]
         least = _ROUND_OFF * float(np.abs(g).max(initial=0.0))
         away = np.where(g < 0, -g, g)
@@ -63,6 +67,15 @@ class Strains:
             order = np.argsort(np.append(s, place), kind="stable")
             s, g = np.append(s, place)[order], np.append(g, value)[order]
         return Runs.of(s, np.where(np.abs(g) <= least, 0.0, g))
+
+    def _beside_borders(self, s: Array) -> NDArray[np.bool_]:
+        """Which places are so near to a border that ends of elements follow that the strain there has the sign that it has at them: it
+        jumps at these ends, where its error is largest."""
+        found, sizes = np.zeros(s.shape, dtype=bool), self.space.sizes
+        for k, _ in self.potential.scene.borders:
+            place = float(self.space.ends[k])
+            found |= (s > place - _BESIDE * sizes[k - 1]) & (s < place + _BESIDE * sizes[k])
+        return found
 
     def extreme(self, component: int, low: float, high: float, least: bool) -> tuple[float, float]:
         """Where one of the strains is least, or largest, between two places, and its value there."""

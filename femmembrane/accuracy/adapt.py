@@ -216,7 +216,7 @@ class _Choice:
         self.target = _SHARE * tightest
         self.hardest = np.argsort(trial.errors)[::-1]
         self.density = trial.density()
-        most = _WRINKLED_DEGREE if trial.wrinkled and not scene.follow_zones else MAX_DEGREE
+        most = _WRINKLED_DEGREE if trial.wrinkled and not scene.follow_borders else MAX_DEGREE
         self.degree = int(np.clip(round(1 - np.log10(tightest) / 2), 2, most))
 
     def candidate(self, elements: int, degree: int) -> Scene:

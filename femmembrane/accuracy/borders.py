@@ -80,7 +80,7 @@ def equilibrium_on_borders(eq: Equilibrium, held: Control) -> Equilibrium:
     if scene.borders or not eq.zones("mechanical").borders:
         return eq
     state = State(eq.state, eq.pressure, eq.potential.evaluate(eq.state, eq.pressure), eq.iterations, 0.0, eq.residual, 0.0)
-    scene, state = put_on_borders(scene.replace(follow_zones=True), state, holding(held))
+    scene, state = put_on_borders(scene.replace(follow_borders=True), state, holding(held))
     bad = ill_posed(state.evaluation.potential, state.evaluation)
     status = Status.CONVERGED if bad is None else bad.status
     own = state.evaluation

@@ -39,7 +39,12 @@ def meridian_order(line: skfem.MeshLine, element: skfem.Element) -> tuple[NDArra
 def shape_functions(degree: int, xi: Array) -> tuple[Array, Array]:
     """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
     xi = np.ascontiguousarray(xi, dtype=float)
-    return _shape_functions(degree, xi.tobytes()) if xi.size <= _FEW else _tabulated(degree, xi)
+    if xi.size <= _FEW:
+        return _shape_functions(degree, xi.tobytes())
+    nodes = lobatto(degree)  # polynomials of this degree are known by their values there
+    value, slope = _shape_functions(degree, nodes.tobytes())
+    weights = lagrange(np.broadcast_to(nodes[:, None], (degree + 1, xi.size)), xi).T
+    return weights @ value, weights @ slope
 
 
 @lru_cache(maxsize=64)

@@ -428,6 +428,12 @@ def space_of(
     return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch, nodal=nodal)
 
 
+@lru_cache(maxsize=8)
+def looked_at(mesh: Meridian, degree: int, anchored: frozenset[str], ends: tuple[float, ...], prestretch: float, nodal: bool) -> Space:
+    """The space whose points are both ends of each element, built once."""
+    return Space(mesh, degree, 0, anchored, ends, prestretch, nodal)
+
+
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
     borders = scene.borders, scene.follows, bool(scene.bodies)

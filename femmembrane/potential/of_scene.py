@@ -32,7 +32,12 @@ def _plain(scene: Scene) -> Scene:
         electric = scene.electric.plain(scene.scales)
     ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
     plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
-    return scene.replace(title="", follow_zones=scene.follows_zones, run=None, analysis=type(scene.analysis)(), **plain)
+    return scene.replace(title="", follow_borders=_following(scene), run=None, analysis=type(scene.analysis)(), **plain)
+
+
+def _following(scene: Scene) -> bool | None:
+    """What decides whether elements follow borders: nothing where there are none."""
+    return False if scene.bodies and scene.follow_borders is False else (scene.follows_zones or None)
 
 
 def require_elements(scene: Scene) -> None:

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..discretization.lift import Moving
-from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
+from ..discretization.space import HESSIAN_PAIRS, Space, anchored, looked_at, space_of
 from ..errors import InputError
 from ..kernels import kernels
 from ..kernels.interface import Array, Elements
@@ -75,6 +75,8 @@ class Potential(PointTerms):
         self.space = (
             space_of(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
             if quadrature is None
+            else looked_at(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
+            if quadrature == 0
             else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch, nodal)
         )
         if borders := getattr(scene, "borders", ()):

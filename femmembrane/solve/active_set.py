@@ -76,7 +76,8 @@ def settled(once: Once, control: Control, potential: Potential, x: Array, pressu
     x = np.ascontiguousarray(x, dtype=float)
     root, x = given.root, given.carried(x)
     result = _on_mesh(once, control, root, x, pressure, magnetic)
-    followed = _with_borders(once, control, root, result) if result.status is Status.CONVERGED else None
+    follow = result.status is Status.CONVERGED and root.scene.follow_borders is not False
+    followed = _with_borders(once, control, root, result) if follow else None
     if followed is None:
         return result
     followed.x = followed.evaluation.carried(followed.x)

@@ -71,7 +71,7 @@ def wrinkling(elements: int, degree: int, **more: object) -> fm.Scene:
 
 @cache
 def lowered(elements: int, degree: int, follow: bool) -> fm.Branch:
-    return fm.trace(wrinkling(elements, degree, follow_zones=follow), start=0.5, direction=-1, until={"center_height": -0.55})
+    return fm.trace(wrinkling(elements, degree, follow_borders=follow), start=0.5, direction=-1, until={"center_height": -0.55})
 
 
 def changes(branch: fm.Branch) -> list[fm.SpecialPoint]:
@@ -121,7 +121,7 @@ def test_arc_length_steps_over_events():
 
 def test_at_a_rim():
     """The wrinkles of a pillow go away at its rim, which slides: where they end the hoop strain there is the natural one."""
-    points = [changes(fm.trace(pillow(n, 5).replace(follow_zones=True), start=0.8, until={"volume": 2.0}))[0] for n in (8, 16)]
+    points = [changes(fm.trace(pillow(n, 5).replace(follow_borders=True), start=0.8, until={"volume": 2.0}))[0] for n in (8, 16)]
     for point in points:
         assert (point.kind, point.zone.place, point.zone.kind) == ("zone_closes", "rim", "radial")
         assert point.zone.reference_radius == 1.0

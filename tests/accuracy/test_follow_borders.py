@@ -1,4 +1,4 @@
-"""Runs whose elements follow the borders of wrinkled zones: ``follow_zones``."""
+"""Runs whose elements follow the borders of wrinkled zones: ``follow_borders``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ VOLUMES = [0.5, *(DISC[height].volume for height in (-0.1, -0.2, -0.3))]
 
 
 def following(elements: int = 12, degree: int = 5, **more: object) -> fm.Scene:
-    return disc_scene(OGDEN, DIPOLE, elements, degree).replace(tension_field=True, follow_zones=True, **more)
+    return disc_scene(OGDEN, DIPOLE, elements, degree).replace(tension_field=True, follow_borders=True, **more)
 
 
 @cache
@@ -41,7 +41,7 @@ def test_each_equilibrium_has_its_own_elements():
 
 def test_a_scene_without_a_tension_field_has_no_zones_to_follow():
     plain = disc_scene(OGDEN, DIPOLE, 12, 2)
-    one, other = (fm.inflate(scene, volumes=VOLUMES[:2], solver="newton") for scene in (plain, plain.replace(follow_zones=True)))
+    one, other = (fm.inflate(scene, volumes=VOLUMES[:2], solver="newton") for scene in (plain, plain.replace(follow_borders=True)))
     assert np.array_equal(one.pressure, other.pressure)
     assert other[-1].potential is one[-1].potential
 
@@ -63,11 +63,11 @@ def test_files_keep_the_elements(tmp_path: Path):
 
 def test_the_key_of_a_scene_file():
     scene = following()
-    assert scene.to_dict()["mesh"]["follow_zones"] is True
+    assert scene.to_dict()["mesh"]["follow_borders"] is True
     assert fm.Scene.from_dict(scene.to_dict()) == scene
-    assert "follow_zones" not in scene.replace(follow_zones=False).to_dict()["mesh"]
-    with pytest.raises(fm.InputError, match=r"mesh\.follow_zones"):
-        scene.replace(follow_zones=1)
+    assert "follow_borders" not in scene.replace(follow_borders=None).to_dict()["mesh"]
+    with pytest.raises(fm.InputError, match=r"mesh\.follow_borders"):
+        scene.replace(follow_borders=1)
 
 
 def test_a_run_goes_on_to_the_bit_where_it_was_interrupted():
@@ -85,7 +85,7 @@ def test_a_branch_is_followed_on_its_borders():
     """By arc length, with longer steps than where borders pass through elements; it goes on to the bit."""
     scene = following(16, 6)
     asked = {"start": 0.5, "until": {"center_height": -0.45}, "direction": -1}
-    plain, branch = (fm.trace(each, **asked) for each in (scene.replace(follow_zones=False), scene))
+    plain, branch = (fm.trace(each, **asked) for each in (scene.replace(follow_borders=False), scene))
     assert branch.status is fm.Status.CONVERGED
     assert len(branch) < 0.5 * len(plain)
     assert branch[-1].center_height == pytest.approx(-0.45, rel=1e-12)

@@ -116,7 +116,7 @@ class Scene:
     vtu : bool
         Whether a run writes surfaces for ParaView to its folder, most of what is in it. They change no number.
     borders : tuple of (int, float)
-        Found with an equilibrium in contact, and not to be given: ends of elements that stand at the borders of contact, by their numbers,
+        Found with an equilibrium, and not to be given: ends of elements that stand at borders of contact or of zones, by their numbers,
         with their places along the meridian.
 
     Raises

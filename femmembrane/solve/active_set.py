@@ -53,7 +53,9 @@ _PULL, _INSIDE = 1e-3, 1e-6
 class Once(Protocol):
     """A corrector on a smooth potential."""
 
-    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult: ...
+    def __call__(
+        self, potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = ..., max_iterations: int = ...
+    ) -> NewtonResult: ...
 
 
 def settled(once: Once, control: Control, potential: Potential, x: Array, pressure: float, magnetic: float) -> NewtonResult:

@@ -39,7 +39,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
     def __init__(self, potential: Potential) -> None:
         self.potential, self.cornered = potential, potential.scene.tension_field or bool(potential.obstacles)
         if potential.follows:
-            self.moving = _CONTACT if potential.obstacles else _ZONES / (potential.space.degree + 1)
+            self.moving = _CONTACT if potential.obstacles else max(0.25, _ZONES / (potential.space.degree + 1))
         self._band, self._half_bandwidth = potential.arc_band, potential.space.half_bandwidth
 
     @property

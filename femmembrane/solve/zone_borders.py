@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _ARRIVED = 1e-8
 #: most rounds of moving the ends, and most times that the zones themselves are looked for anew
 _ROUNDS, _FRESH = 8, 3
+#: most iterations of a damped solve
+_PATIENT = 20
 #: zones narrower than this part of the meridian are left out, which changes the energy by its third power
 _NARROW = 1e-5
 #: distance of a border from an end that stays, over the length of the meridian, that is none
@@ -56,7 +58,10 @@ def settled_zones(once: Once, control: Control, potential: Potential, x: Array, 
         Guess.
     """
     given = cast("WrinklingPotential", potential)
-    result = once(given.root, control=control, x=given.carried(np.ascontiguousarray(x, dtype=float)), pressure=pressure)
+    root, x = given.root, given.carried(np.ascontiguousarray(x, dtype=float))
+    result = once(root, control=control, x=x, pressure=pressure)
+    if result.status is not Status.CONVERGED:  # the guess was interpolated from elements whose kinks are elsewhere
+        result = once(root, control=control, x=x, pressure=pressure, damped=True, max_iterations=_PATIENT)
     if result.status is not Status.CONVERGED:
         return result
     followed = _with_borders(once, control, result, given.mark)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
+from scipy.special import ellipe, ellipk
 
 import femmembrane as fm
 from femmembrane.results.table import special_point_columns, special_point_rows
@@ -162,3 +164,48 @@ def test_files_and_tables_keep_them(tmp_path: Path):
     limit = next(row for row in rows if row["kind"] == "limit_point")
     assert limit["changing_zone_kind"] == ""
     assert "zone=ZoneChange(kind='radial'" in repr(changes(branch)[0])
+
+
+def test_of_an_annulus():
+    """Wrinkles that open near the rim go away near the hole; meshes agree to eight digits, and steps stay few."""
+    found = []
+    for elements in (12, 16):
+        scene = wrinkling(8, 4).replace(mesh=fm.annulus(0.2, elements=elements), degree=5, follow_borders=True)
+        branch = fm.trace(scene, start=0.5, direction=-1, until={"volume": -0.4}, max_steps=60)
+        assert branch.status is fm.Status.CONVERGED
+        assert len(branch) < 30
+        found.append(changes(branch))
+    assert [p.kind for p in found[1]] == ["zone_opens", "zone_closes"]
+    assert found[1][0].zone.reference_radius == pytest.approx(0.617, abs=1e-3)
+    assert found[1][1].zone.reference_radius == pytest.approx(0.285, abs=1e-3)
+    for coarse, fine in zip(*found, strict=True):
+        assert coarse.pressure == pytest.approx(fine.pressure, rel=1e-8)
+
+
+def test_up_to_a_slack_circle():
+    """Elements that follow come as close to it as elements that do not, and the trace ends there by its name."""
+    scene = disc_scene(OGDEN, (600.0, -3.25), 16, 4).replace(tension_field=True, follow_borders=True)
+    branch = fm.trace(scene, start=2.1, direction=-1, until={"center_height": 0.1}, max_steps=60)
+    assert branch.status is fm.Status.SLACK
+    assert branch[-1].center_height < 0.34  # by shooting it opens at 0.3211
+    (opens,) = changes(branch)
+    assert opens.zone.reference_radius == pytest.approx(0.8224, abs=1e-3)
+
+
+def test_the_mylar_balloon():
+    """As the pressure of a pillow goes to zero its sheet does not stretch, and all but its pole is wrinkled (Paulsen 1994, Mladenov 2001).
+
+    The radius of its rim is then sqrt(2)/K(1/sqrt 2) = 0.76276 of that of the flat sheets.
+    """
+    scene, radii = pillow(12, 5).replace(follow_borders=True), []
+    eq = fm.equilibrium(scene, volume=0.7)
+    for pressure in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        eq = fm.equilibrium(scene, pressure=pressure, start=eq)
+        radii.append(float(eq.profile([1.0])["rho"][0]))
+    limit = math.sqrt(2) / ellipk(0.5)
+    assert limit == pytest.approx(0.76276, abs=1e-5)
+    a, b, c = radii[-3:]
+    assert c - (c - b) ** 2 / (c - 2 * b + a) == pytest.approx(limit, abs=2e-8)  # Aitken's extrapolation
+    assert eq.center_height == pytest.approx(limit * math.sqrt(2) * (ellipe(0.5) - ellipk(0.5) / 2), abs=3e-5)
+    assert len(eq.zones("mechanical")) == 2
+    assert eq.zones("mechanical").fraction("radial") > 0.997

@@ -26,6 +26,7 @@ from ..discretization.meridian import Accuracy, Asked, Meridian, by_quantity, in
 from ..discretization.space import Space, space_of, transferred
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Potential, potential_of
+from ..results.equilibrium import Equilibrium, recorded
 from ..scene import MAX_DEGREE, Scene
 from ..solve.branch import first_point
 from ..solve.controls import CONTROLS
@@ -40,11 +41,13 @@ from .error_estimate import finer_space, same_state
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
-    from ..results.equilibrium import Equilibrium
+    from ..results.contact import Contact
 
 #: from a scene with a mesh to the equilibria that are wanted, or a part of them
 Follow = Callable[[Scene], "Branch"]
 
+#: a run with no more states keeps one mesh
+_FEW_STATES = 2
 #: states of the trial run whose errors are estimated
 STATES = 12
 #: most meshes that are chosen until a run is accurate enough all along
@@ -61,11 +64,21 @@ _GRADING_DEGREE = 4
 _WRINKLED_DEGREE = 4
 #: fewer elements would do for some accuracies, but may let a run lose its branch
 _FEWEST, _MOST = 3, 2000
+#: the same for a mesh that changes along the run
+_FEWEST_ALONG = 5
+#: most elements of one mesh for a run on which the mesh may change, and most of a mesh that it changes to
+_MOST_OF_ONE, _MOST_ALONG = 64, 500
 #: estimates are off by some tens of per cent, and may use this part of the accuracy
 _SHARE = 0.6
+#: the part that it may use where the mesh changes, so that it serves for a while; less is round-off
+_SHARE_AHEAD, _ROUND_OFF = 0.05, 1e-12
+#: the part beyond which it changes, and the size over that of the mesh that would do, at which a smaller one is taken
+_CHANGED, _TOO_FINE = 0.5, 3.0
 #: share and inner radius of the elements that go to the pole when its height is held: the response to a force on the pole, which decides
 #: how a height converges, is logarithmic there
 _POLE_SHARE, _POLE_RADIUS = 0.3, 0.005
+#: smallest density of elements in a zone of contact over that beyond its borders
+_IN_CONTACT = 0.5
 #: smallest density of elements over the mean, and smallest pressure over the largest one that still counts by itself
 _LEAST_DENSITY, _LEAST_PRESSURE = 0.1, 0.01
 
@@ -96,6 +109,83 @@ def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
 
 
 @dataclass(frozen=True)
+class Along:
+    """Meshes that change along a run, where one for all of it would be large, or would not keep the accuracy.
+
+    Every state is judged. Where its estimated error comes near to the accuracy, a mesh is chosen for it that leaves room for the next ones.
+
+    Attributes
+    ----------
+    controls : tuple of str
+        What is held while errors are estimated.
+    yardstick : Yardstick
+    """
+
+    controls: tuple[str, ...]
+    yardstick: Yardstick
+
+    @classmethod
+    def of(cls, scene: Scene, control: str, sizes: tuple[float, float]) -> Along:
+        """That of a run which went on with the sizes below which its errors are not relative."""
+        return cls(_controls(control), Yardstick(by_quantity(_accuracy(scene)), *sizes))
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """The sizes of pressure and eigenvalues below which errors are not relative."""
+        return self.yardstick.pressure, self.yardstick.eigenvalues
+
+    def share(self, potential: Potential, state: State) -> float:
+        """The estimated error of a state over the accuracy; infinite without an estimate, and 0 where no mesh has a say."""
+        if ill_posed(potential, state.evaluation) is not None:
+            return 0.0
+        error = relative_error(potential, state.x, state.pressure, self.controls, self.yardstick)
+        if np.isnan(error):
+            error = _across(potential, state, self.yardstick.pressure)
+        return error / self.yardstick.asked.tightest if np.isfinite(error) else np.inf
+
+    def mesh_for(self, scene: Scene, potential: Potential, state: State, share: float) -> Scene:
+        """The scene on a mesh for a state and the next ones; ``share`` is that of the state on the mesh that the scene has.
+
+        Raises
+        ------
+        SolveError
+            With status ACCURACY_NOT_MET when no mesh is good enough.
+        """
+        accuracy = _accuracy(scene)
+        for ends in (scene.mesh, scene.mesh.refined()):
+            on = _on(scene, ends.on_ends(ends.breakpoints()))
+            graded_by = _found_again(on, potential, state)
+            if graded_by is None:
+                continue
+            trial = _estimated([graded_by], self.controls, on.mesh.elements, self.yardstick.asked, self.yardstick)
+            if len(trial.errors):
+                target = max(_SHARE_AHEAD, min(_ROUND_OFF / self.yardstick.asked.tightest, _SHARE))
+                return _Choice(scene, trial, accuracy, target, _MOST_ALONG).near(scene, share)
+        message = f"mesh.accuracy = {in_words(accuracy)}: no error can be estimated at V = {state.volume:.6g}, P = {state.pressure:.6g}"
+        raise SolveError(message, status=Status.ACCURACY_NOT_MET)
+
+    def smaller(self, scene: Scene, potential: Potential, state: State, share: float) -> Scene | None:
+        """The scene on a much smaller mesh that would do, None where there is none."""
+        if share > _SHARE_AHEAD * _TOO_FINE ** (-2.0 * scene.degree) or scene.mesh.elements < _FEWEST_ALONG * _TOO_FINE:
+            return None
+        found = self.mesh_for(scene, potential, state, share)
+        return found if _TOO_FINE * found.mesh.elements <= scene.mesh.elements else None
+
+    def full(self, share: float) -> bool:
+        """Whether the error of a state has come near to the accuracy."""
+        return share > _CHANGED
+
+
+def _found_again(scene: Scene, potential: Potential, state: State) -> Equilibrium | None:
+    """The record of a state on another mesh, where the branch meets the plane across it; None where it does not."""
+    onto = potential_of(scene)
+    found = met_across(onto, potential, first_point(potential, state, 1))
+    if found.status is not Status.CONVERGED:
+        return None
+    return recorded(scene, onto, found.x, found.pressure, found.evaluation, Status.CONVERGED)
+
+
+@dataclass(frozen=True)
 class Shortfall:
     """Where a run leaves the accuracy that its mesh was chosen for. ``kept`` equilibria are as accurate as asked; ``error`` is the estimate
     for the next one, or NaN without an estimate.
@@ -112,18 +202,23 @@ class Shortfall:
         return f"mesh.accuracy = {in_words(self.accuracy)} is not met all along: {where}"
 
 
-def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene, Shortfall | None]:
+def choose_and_check(scene: Scene, follow: Follow, control: str, changes: bool = False) -> tuple[Scene, Shortfall | None, Along | None]:
     """As :func:`choose_mesh`, with the errors of the run on the chosen mesh estimated and, where they are too large, the mesh chosen again.
 
-    A few states of a trial do not stand for a whole run: a run that ends in a spike below a source becomes harder without end.
+    A few states of a trial do not stand for a whole run: a run that ends in a spike below a source becomes harder without end. Where the
+    mesh may change along the run, and one of moderate size does not keep the accuracy, the mesh is that of the first state, with what is to
+    change it.
     """
     controls = _controls(control)
-    trial, found = _trial(scene, follow, control), None
+    first, found = _trial(scene, follow, control), None
+    trial = first
+    changes = changes and not trial.wrinkled and len(trial.states) > _FEW_STATES
+    most = _MOST_OF_ONE if changes else _MOST
     for _ in range(_ROUNDS):
         try:
-            chosen = _Choice(scene, trial, _accuracy(scene)).chosen()
+            chosen = _Choice(scene, trial, _accuracy(scene), most=most).chosen()
         except SolveError:
-            if found is not None:
+            if found is not None or changes:
                 break
             easier = trial.before_the_hardest()
             if easier is None:
@@ -141,8 +236,16 @@ def choose_and_check(scene: Scene, follow: Follow, control: str) -> tuple[Scene,
         trial = _estimated([finer[k] for k in _checked(finer)], controls, chosen.mesh.elements, by_quantity(_accuracy(scene)))
         if not len(trial.errors):
             break
+    if changes and (found is None or found[1] is not None):
+        return _first_of_many(scene, first), None, Along(controls, first.yardstick)
     branch, shortfall = cast("tuple[Branch, Shortfall | None]", found)
-    return branch.scene, shortfall
+    return branch.scene, shortfall, None
+
+
+def _first_of_many(scene: Scene, trial: _Trial) -> Scene:
+    """The scene on a mesh for the first state of a run."""
+    first = replace(trial, states=trial.states[:1], errors=trial.errors[:1])
+    return _Choice(scene, first, _accuracy(scene), most=_MOST_ALONG).chosen()
 
 
 def _farther(branch: Branch, shortfall: Shortfall, other: Branch, others: Shortfall | None) -> bool:
@@ -173,7 +276,7 @@ def _shortfall(branch: Branch, controls: tuple[str, ...], accuracy: Asked) -> Sh
         if eq.status.ill_posed:
             return 0.0
         found = relative_error(eq.potential, eq.state, eq.pressure, controls, yardstick)
-        return _across(eq.potential, eq, yardstick.pressure) if np.isnan(found) and len(controls) > 1 else found
+        return _across(eq.potential, _state_of(eq), yardstick.pressure) if np.isnan(found) and len(controls) > 1 else found
 
     good = -1
     for k in _checked(branch):
@@ -185,12 +288,16 @@ def _shortfall(branch: Branch, controls: tuple[str, ...], accuracy: Asked) -> Sh
     return None
 
 
-def _across(potential: Potential, eq: Equilibrium, scale: float) -> float:
+def _state_of(eq: Equilibrium) -> State:
+    """The solver's state of a record."""
+    return State(eq.state, eq.pressure, eq.potential.evaluate(eq.state, eq.pressure), 0, 0.0, 0.0, 0.0)
+
+
+def _across(potential: Potential, state: State, scale: float) -> float:
     """Estimated relative error of P next to folds of volume and height: the distance to the branch of a finer space there."""
-    evaluation = potential.evaluate(eq.state, eq.pressure)
-    state = State(eq.state, eq.pressure, evaluation, 0, 0.0, 0.0, 0.0)
-    met = met_across(potential_of(finer_space(potential, evaluation, eq.pressure)[0]), potential, first_point(potential, state, 1))
-    return abs(met.pressure - eq.pressure) / max(abs(eq.pressure), scale) if met.status is Status.CONVERGED else np.nan
+    finer = potential_of(finer_space(potential, state.evaluation, state.pressure)[0])
+    met = met_across(finer, potential, first_point(potential, state, 1))
+    return abs(met.pressure - state.pressure) / max(abs(state.pressure), scale) if met.status is Status.CONVERGED else np.nan
 
 
 def graded(s: Array, density: Array, elements: int, corners: ArrayLike = ()) -> tuple[float, ...]:
@@ -210,10 +317,10 @@ def graded(s: Array, density: Array, elements: int, corners: ArrayLike = ()) -> 
 class _Choice:
     """The search for the number of elements and the degree."""
 
-    def __init__(self, scene: Scene, trial: _Trial, accuracy: Asked) -> None:
-        self.scene, self.trial, self.accuracy = scene, trial, accuracy
+    def __init__(self, scene: Scene, trial: _Trial, accuracy: Asked, share: float = _SHARE, most: int = _MOST) -> None:
+        self.scene, self.trial, self.accuracy, self.most = scene, trial, accuracy, most
         tightest = by_quantity(accuracy).tightest
-        self.target = _SHARE * tightest
+        self.target = share * tightest
         self.hardest = np.argsort(trial.errors)[::-1]
         self.density = trial.density()
         most = _WRINKLED_DEGREE if trial.wrinkled and not scene.follow_borders else MAX_DEGREE
@@ -237,15 +344,36 @@ class _Choice:
             estimated = self.trial.error_on(found, self.hardest)
             if estimated <= self.target:
                 return found.replace(mesh=found.mesh.on_ends(found.mesh.breakpoints(), self.accuracy, estimated))
-            if elements >= _MOST:
+            if elements >= self.most:
                 raise self.not_met(estimated)
-            elements = min(elements + 1 + elements // 8, _MOST)
+            elements = min(elements + 1 + elements // 8, self.most)
+
+    def near(self, scene: Scene, share: float) -> Scene:
+        """A mesh that is good enough for all states, looked for where the error that another one leaves says that it is.
+
+        ``share`` is the error on the mesh of a scene over the accuracy. The number of elements is good to some tens of per cent.
+        """
+        asked, order = by_quantity(self.accuracy).tightest, 2.0 * self.degree
+        known = share * asked if np.isfinite(share) else 2.0**order * self.target
+        n = scene.mesh.elements * scene.degree / self.degree * (known / self.target) ** (1 / order)
+        best = np.inf
+        while True:
+            elements = int(np.clip(ceil(n), _FEWEST_ALONG, self.most))
+            found = self.candidate(elements, self.degree)
+            estimated = self.trial.error_on(found, self.hardest)
+            last = elements >= self.most
+            if estimated <= (_CHANGED * asked if last else self.target):
+                return found.replace(mesh=found.mesh.on_ends(found.mesh.breakpoints(), self.accuracy, estimated))
+            best = min(best, estimated)
+            if last:
+                raise self.not_met(best)
+            n = elements * max(1.1, min(2.0, (estimated / self.target) ** (1 / order)))
 
     def fewest(self) -> int:
         """The number of elements, to a tenth or so, from which the hardest states are as good as wanted: a secant search in logarithms."""
         order = 2.0 * self.degree
-        n = int(np.clip(ceil(self.trial.elements / 2 * (self.trial.errors.max() / self.target) ** (1 / order)), _FEWEST, _MOST))
-        low, high, best = _FEWEST - 1, _MOST + 1, np.inf
+        n = int(np.clip(ceil(self.trial.elements / 2 * (self.trial.errors.max() / self.target) ** (1 / order)), _FEWEST, self.most))
+        low, high, best = _FEWEST - 1, self.most + 1, np.inf
         last: tuple[int, float] | None = None
         while high - low > 1 + low // 10:
             e = self.error(n, self.degree)
@@ -256,13 +384,13 @@ class _Choice:
             last = (n, e)
             wanted = n * (e / self.target) ** (1 / order) if e < np.inf else 2.0 * n
             n = int(np.clip(ceil(min(wanted, 4.0 * n)), low + 1, high - 1))
-        if high > _MOST:
+        if high > self.most:
             raise self.not_met(best)
         return high
 
     def not_met(self, best: float) -> SolveError:
         asked = f"mesh.accuracy = {in_words(self.accuracy)}"
-        message = f"{asked} is not met by {_MOST} elements of degree {self.degree}; the best estimate is {best:.1e}"
+        message = f"{asked} is not met by {self.most} elements of degree {self.degree}; the best estimate is {best:.1e}"
         return SolveError(message, status=Status.ACCURACY_NOT_MET)
 
 
@@ -285,13 +413,17 @@ class _Trial:
 
     def density(self) -> tuple[Array, Array]:
         """Points s and the density of elements there that suits all states."""
-        space = self.space
-        first, last = space.ends[[0, -1]]
-        centres, s = (space.ends[1:] + space.ends[:-1]) / 2, np.linspace(first, last, 40 * self.elements + 1)
+        first, last = self.space.ends[[0, -1]]
+        s = np.linspace(first, last, 40 * self.elements + 1)
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
         for eq, weight in zip(self.states, weights, strict=True):
-            density = np.maximum(_misses(space, eq.potential.carried(eq.state)) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+            own = eq.of_branch.potential
+            state, space = own.carried(eq.of_branch.state), own.root.space
+            centres = (space.ends[1:] + space.ends[:-1]) / 2
+            density = np.maximum(_misses(space, state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+            if (contact := eq.of_branch.contact) is not None:
+                density = _with_contact(density, space, contact)
             smooth = np.exp(np.interp(s, centres, np.log(density)))
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
@@ -312,10 +444,16 @@ class _Trial:
             held = kind.at(kind.value(eq.potential.space, eq.state, eq.pressure, eq.volume))
             result = solved_in(potential, held, eq.potential, eq.state, eq.pressure, damped=True)
             if result.status is Status.CONVERGED:
-                state = State.of(result)
-                error = relative_error(state.evaluation.potential, state.evaluation.x, state.pressure, self.controls, self.yardstick)
+                own = result.evaluation
+                error = relative_error(own.potential, own.x, result.pressure, self.controls, self.yardstick)
                 return error if np.isfinite(error) else np.inf
-        return np.inf
+        return self._met(here, eq) if len(self.controls) > 1 else np.inf
+
+    def _met(self, scene: Scene, eq: Equilibrium) -> float:
+        """The same next to folds of all that can be held."""
+        met = _found_again(scene, eq.potential, _state_of(eq))
+        error = np.nan if met is None else _across(met.potential, _state_of(met), self.yardstick.pressure)
+        return error if np.isfinite(error) else np.inf
 
 
 @dataclass(frozen=True)
@@ -409,8 +547,10 @@ def _on(scene: Scene, mesh: Meridian) -> Scene:
     return scene.replace(mesh=mesh, degree=_TRIAL_DEGREE, run=None, analysis=type(scene.analysis)())
 
 
-def _estimated(equilibria: Sequence[Equilibrium], controls: tuple[str, ...], elements: int, asked: Accuracy) -> _Trial:
-    yardstick = _yardstick(equilibria, asked)
+def _estimated(
+    equilibria: Sequence[Equilibrium], controls: tuple[str, ...], elements: int, asked: Accuracy, yardstick: Yardstick | None = None
+) -> _Trial:
+    yardstick = yardstick or _yardstick(equilibria, asked)
     errors = np.array([relative_error(eq.potential, eq.state, eq.pressure, controls, yardstick) for eq in equilibria])
     known = np.isfinite(errors)
     states = [eq for eq, k in zip(equilibria, known, strict=True) if k]
@@ -464,11 +604,22 @@ def _trial_mesh(mesh: Meridian, elements: int) -> Meridian:
     return mesh.on_ends(graded(np.array([first, last]), np.ones(2), elements, corners))
 
 
+def _with_contact(density: Array, space: Space, contact: Contact) -> Array:
+    """A density of elements that does not fall to nothing in zones of contact, where little is to be described: borders take ends there."""
+    centres, density = (space.ends[1:] + space.ends[:-1]) / 2, density.copy()
+    for zone in contact.zones:
+        inside = (centres > zone.start) & (centres < zone.stop)
+        beyond = np.flatnonzero(inside[1:] != inside[:-1])
+        beyond = np.where(inside[beyond], beyond + 1, beyond)
+        density[inside] = np.maximum(density[inside], _IN_CONTACT * density[beyond].max(initial=0.0))
+    return density
+
+
 def _misses(space: Space, x: Array) -> Array:
     """The part of a state that elements of the grading degree miss, for each element: the integral of the squared slopes of the difference,
     over the sum of all.
     """
-    low = space_of(space.mesh, _GRADING_DEGREE, ends=tuple(space.ends))
+    low = space_of(space.mesh.on_ends(tuple(space.ends.tolist())), _GRADING_DEGREE)
     missed = x - transferred(low, transferred(space, x, low), space)
 
     def slopes(y: Array) -> Array:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..discretization.meridian import assigned_ends
+from ..discretization.meridian import assigned_ends, on_own_ends
+from ..discretization.space import space_of_scene
 from ..errors import InputError, SolveError, Status
 from ..potential import Potential, potential_of
 from ..results.equilibrium import Equilibrium, recorded
@@ -17,6 +18,7 @@ from ..solve.finer_space import solved_in
 from ..solve.newton import NewtonResult
 from ..solve.state import State
 from ..solve.wellposed import ill_posed
+from ..solve.zone_borders import FRESH, ROUNDS, ZoneBorders
 from ..solve.zone_strains import HOOP, Strains
 
 if TYPE_CHECKING:
@@ -50,6 +52,8 @@ def put_on_borders(scene: Scene, state: State, solve: Solve) -> tuple[Scene, Sta
     SolveError
         Where the equilibrium is lost on the way, or the borders do not come to rest.
     """
+    if scene.bodies:
+        return _beside_bodies(scene, state, solve)
     onto = cast("WrinklingPotential", potential_of(scene))
     found = solve(onto, state)
     if found.status is not Status.CONVERGED:
@@ -58,6 +62,30 @@ def put_on_borders(scene: Scene, state: State, solve: Solve) -> tuple[Scene, Sta
     if not own.borders:
         _check_borders(own, found)
     return scene.bordered(own.borders), State.of(found, state.iterations)
+
+
+def _beside_bodies(base: Scene, state: State, solve: Solve) -> tuple[Scene, State]:
+    """The same where ends of elements follow borders of contact as well: on a mesh that has ends at the borders of the zones."""
+    scene, places = base, base.mesh.breakpoints()
+    for _ in range(FRESH):
+        borders = ZoneBorders.of(Strains(state.evaluation))
+        if borders is None or np.isin(borders.places, state.evaluation.potential.space.ends).all():
+            break
+        while True:
+            space = space_of_scene(base.bordered(()))
+            moved = space.with_moved(assigned_ends(space.ends, borders.ends, np.flatnonzero(~space.movable).tolist())).ends
+            scene = base.replace(mesh=on_own_ends(base.mesh, moved[np.isin(space.ends, places)]))
+            found = solve(potential_of(scene), state)
+            if found.status is not Status.CONVERGED:
+                raise SolveError("the equilibrium was not found on elements that end at the borders of its zones", status=found.status)
+            state = State.of(found, state.iterations)
+            if borders.at_rest:
+                break
+            if borders.rounds == ROUNDS or not borders.move(found):
+                raise SolveError("the borders of its zones do not come to rest; more elements may help", status=Status.NOT_CONVERGED)
+        if borders.explain(found):
+            break
+    return scene.bordered(state.evaluation.potential.borders), state
 
 
 def _check_borders(potential: WrinklingPotential, found: NewtonResult) -> None:
@@ -77,7 +105,7 @@ def equilibrium_on_borders(eq: Equilibrium, held: Control) -> Equilibrium:
         raise InputError("effects.tension_field", False, allowed)
     if eq.status.ill_posed:
         raise SolveError(f"the equilibrium is {eq.status.value}, and what a mesh finds depends on the mesh", status=eq.status)
-    if scene.borders or not eq.zones("mechanical").borders:
+    if (scene.borders and not scene.bodies) or not eq.zones("mechanical").borders:
         return eq
     state = State(eq.state, eq.pressure, eq.potential.evaluate(eq.state, eq.pressure), eq.iterations, 0.0, eq.residual, 0.0)
     scene, state = put_on_borders(scene.replace(follow_borders=True), state, holding(held))

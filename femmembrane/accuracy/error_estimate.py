@@ -15,6 +15,7 @@ import numpy as np
 from ..discretization.space import transferred
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
+from ..results.contact import contact_of
 from ..results.error_estimate import ErrorEstimate, from_numbers
 from ..results.verdict import Verdict
 from ..scene import MAX_DEGREE, Scene
@@ -95,9 +96,14 @@ def finer_space(potential: Potential, evaluation: Evaluation, pressure: float) -
     """The scene on finer elements, and in words."""
     scene = potential.scene
     better = finer_scene(scene)
+    inside = ""
     if scene.tension_field and (evaluation.stress <= 0).any() and not on_its_borders(scene, evaluation.x, pressure):
+        inside = "wrinkled zones"
+    elif potential.obstacles and not all(zone.followed and zone.smooth for zone in contact_of(evaluation).zones):
+        inside = "contact, or edges of bodies,"
+    if inside:
         better = scene.replace(mesh=scene.mesh.refined().refined(), degree=min(scene.degree + 1, MAX_DEGREE))
-        what = f"quartered elements of degree {better.degree}, for borders of wrinkled zones inside elements: rough"
+        what = f"quartered elements of degree {better.degree}, for borders of {inside} inside elements: rough"
     else:
         what = f"elements of degree {better.degree}" if better.degree > scene.degree else f"halved elements of degree {better.degree}"
     return better, f"hierarchical: against the same load on {what}"

@@ -39,12 +39,7 @@ def meridian_order(line: skfem.MeshLine, element: skfem.Element) -> tuple[NDArra
 def shape_functions(degree: int, xi: Array) -> tuple[Array, Array]:
     """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
     xi = np.ascontiguousarray(xi, dtype=float)
-    if xi.size <= _FEW:
-        return _shape_functions(degree, xi.tobytes())
-    nodes = lobatto(degree)  # polynomials of this degree are known by their values there
-    value, slope = _shape_functions(degree, nodes.tobytes())
-    weights = lagrange(np.broadcast_to(nodes[:, None], (degree + 1, xi.size)), xi).T
-    return weights @ value, weights @ slope
+    return _shape_functions(degree, xi.tobytes()) if xi.size <= _FEW else _summed(degree, xi)
 
 
 @lru_cache(maxsize=64)
@@ -63,12 +58,36 @@ def _tabulated(degree: int, xi: Array) -> tuple[Array, Array]:
     return value, slope
 
 
+def _summed(degree: int, xi: Array) -> tuple[Array, Array]:
+    """The same at many points, as sums of Legendre polynomials."""
+    legendre = np.polynomial.legendre.legvander(2 * xi - 1, degree)
+    value, slope = _series(degree)
+    return legendre @ value, legendre @ slope
+
+
+@lru_cache(maxsize=64)
+def _series(degree: int) -> tuple[Array, Array]:
+    """Shape functions and their slopes in Legendre polynomials, a column each."""
+    points = lobatto(degree)
+    inverse = np.linalg.inv(np.polynomial.legendre.legvander(2 * points - 1, degree))
+    value, slope = shape_functions(degree, points)
+    return inverse @ value, inverse @ slope
+
+
 def second_derivatives(degree: int, xi: Array) -> Array:
     """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
     points = lobatto(degree)
     slope = shape_functions(degree, points)[1]
     series = np.linalg.solve(np.polynomial.legendre.legvander(2 * points - 1, degree), slope)  # of the slopes in Legendre polynomials
     return np.asarray(np.polynomial.legendre.legval(2 * np.asarray(xi) - 1, 2 * np.polynomial.legendre.legder(series)).T)
+
+
+@lru_cache(maxsize=32)
+def gauss_points(count: int) -> Array:
+    """Gauss points on [0, 1]; read-only."""
+    points: Array = (np.polynomial.legendre.leggauss(count)[0] + 1) / 2
+    points.setflags(write=False)
+    return points
 
 
 def lobatto(degree: int) -> Array:

@@ -68,7 +68,7 @@ class FollowingPotential(Potential):
         return True
 
     @property
-    def borders(self) -> Borders:
+    def borders(self) -> Borders:  # type: ignore[override]  # read only here, and there
         """Ends of elements that stand at borders, and their places."""
         return self.scene.borders
 
@@ -79,11 +79,14 @@ class FollowingPotential(Potential):
             return root
         known = root._moved.pop(borders, None)
         if known is None:
-            known = type(root)(root.scene.bordered(borders), root=root)
+            known = root._on(borders)
         root._moved[borders] = known
         if len(root._moved) > _KEPT:
             root._moved.pop(next(iter(root._moved)), None)
         return known
+
+    def _on(self, borders: Borders) -> Self:
+        return type(self)(self.scene.bordered(borders), root=self)
 
     @cached_property
     def to_root(self) -> sparse.csr_matrix:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,14 @@ class PathMemory:
         Load (in a trace: arc length) at the last points that predict the next one, two at most.
     points, slopes : ndarray, shape (len(sigma), n_free + 1)
         (x, P) and its derivative with respect to sigma there; of a trace over a number the number as well.
+    sizes : (float, float) or None
+        Where the mesh changes along the run: the sizes of pressure and eigenvalues below which errors are not relative.
     """
 
     sigma: tuple[float, ...]
     points: Array
     slopes: Array
+    sizes: tuple[float, float] | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretization.meridian import on_own_ends
 from ..errors import Status
 from ..quantities import typed
 from ..scene.variation import Parameter
@@ -67,10 +68,13 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
 
 
 def _on_branches(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str) -> dict[str, Variable]:
-    """The states on the mesh of the branch, of those that were put on borders after it."""
+    """The states on the mesh of the branch, of those that were put on borders after it, with their own ends of elements beside bodies."""
     if all(e.on_branch is None for e in equilibria):
         return {}
-    return equilibrium_variables([e.of_branch for e in equilibria], width, dimension, prefix + ON_BRANCH)
+    states = equilibrium_variables([e.of_branch for e in equilibria], width, dimension, prefix + ON_BRANCH)
+    if all(e.scene.mesh == e.of_branch.scene.mesh for e in equilibria):
+        return states
+    return {prefix + "element_ends": ((dimension, "element_end"), np.array([e.scene.mesh.breakpoints() for e in equilibria])), **states}
 
 
 def _border_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str) -> dict[str, Variable]:
@@ -104,12 +108,18 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
     if over:
         scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
     on_branch: list[Equilibrium | None] = [None] * count
-    if prefix + "border_end" in dataset:
-        borders = _borders_of(dataset, prefix)
-        if prefix + ON_BRANCH + "state" in dataset:
-            states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
-            on_branch = [eq if own else None for eq, own in zip(states_there, borders, strict=True)]
-        scenes = [each.bordered(own) for each, own in zip(scenes, borders, strict=True)]
+    borders = _borders_of(dataset, prefix) if prefix + "border_end" in dataset else [()] * count
+    if prefix + ON_BRANCH + "state" in dataset:
+        there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
+        own_ends = [each.mesh.breakpoints() for each in scenes]
+        if prefix + "element_ends" in dataset:
+            own_ends = list(_finite(dataset, prefix + "element_ends", count, scene.mesh.elements + 1))
+        for k, ends in enumerate(own_ends):
+            if not np.array_equal(ends, scenes[k].mesh.breakpoints()):
+                scenes[k] = scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, ends))
+            if scenes[k].mesh != there[k].scene.mesh or borders[k] != there[k].scene.borders:
+                on_branch[k] = there[k]
+    scenes = [each.bordered(own) for each, own in zip(scenes, borders, strict=True)]
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},

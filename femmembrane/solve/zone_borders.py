@@ -33,24 +33,22 @@ if TYPE_CHECKING:
 #: a move after which borders are at rest, over the length of the meridian: the next one would be smaller by some orders
 _ARRIVED = 1e-8
 #: most rounds of moving the ends, and most times that the zones themselves are looked for anew
-_ROUNDS, _FRESH = 8, 3
-#: most iterations of a damped solve
-_PATIENT = 20
+ROUNDS, FRESH = 8, 3
 #: zones narrower than this part of the meridian are left out, which changes the energy by its third power
 _NARROW = 1e-5
 #: distance of a border from an end that stays, over the length of the meridian, that is none
 _THERE = 1e-9
 
 
-def settled_zones(once: Once, control: Control, potential: Potential, x: Array, pressure: float) -> NewtonResult:
+def settled_zones(once: Once, patient: Once, control: Control, potential: Potential, x: Array, pressure: float) -> NewtonResult:
     """Where a corrector ends with ends of elements at the borders of zones.
 
     Where there are none, or more than the elements can follow, it is the equilibrium on the mesh of the scene.
 
     Parameters
     ----------
-    once : callable
-        The corrector on a given mesh.
+    once, patient : callable
+        The corrector on a given mesh, and one for worse guesses.
     control : Control
         Of coefficients on the mesh of the scene.
     potential : Potential
@@ -61,7 +59,7 @@ def settled_zones(once: Once, control: Control, potential: Potential, x: Array, 
     root, x = given.root, given.carried(np.ascontiguousarray(x, dtype=float))
     result = once(root, control=control, x=x, pressure=pressure)
     if result.status is not Status.CONVERGED:  # the guess was interpolated from elements whose kinks are elsewhere
-        result = once(root, control=control, x=x, pressure=pressure, damped=True, max_iterations=_PATIENT)
+        result = patient(root, control=control, x=x, pressure=pressure)
     if result.status is not Status.CONVERGED:
         return result
     followed = _with_borders(once, control, result, given.mark)
@@ -74,7 +72,7 @@ def settled_zones(once: Once, control: Control, potential: Potential, x: Array, 
 def _with_borders(once: Once, control: Control, result: NewtonResult, mark: Mark | None) -> NewtonResult | None:
     """The equilibrium with ends of elements at the borders of its zones; None where it has none, or they are not found."""
     spent = result.iterations
-    for _ in range(_FRESH):
+    for _ in range(FRESH):
         borders = ZoneBorders.of(Strains(result.evaluation), mark)
         if borders is None:
             return None
@@ -85,7 +83,7 @@ def _with_borders(once: Once, control: Control, result: NewtonResult, mark: Mark
             spent, result = spent + found.iterations, found
             if borders.at_rest:
                 break
-            if borders.rounds == _ROUNDS or not borders.move(result):
+            if borders.rounds == ROUNDS or not borders.move(result):
                 return None
         if mark is not None or borders.explain(result):
             result.iterations = spent

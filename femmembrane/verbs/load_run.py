@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..accuracy.adapt import spread
+from ..accuracy.adapt import Along, spread
 from ..accuracy.borders import holding
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
@@ -28,9 +28,13 @@ from ..solve.number_path import NumberPath
 from ..solve.state import State
 from ..solve.wellposed import slackness
 from .arguments import kind_of, plain
+from .changed_mesh import carried_path, state_there
 from .meshing import carried
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record_on_borders, remembered, restore, resume, special_point
+
+#: loads after which a much smaller mesh is looked for
+_OFTEN = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,10 @@ class LoadRequest(Request):
     @property
     def errors_at(self) -> str:
         return self.held.name if self.held.name in CONTROLS else "volume"
+
+    @property
+    def mesh_changes(self) -> bool:
+        return True
 
     def on(self, scene: Scene) -> Self:
         return replace(self, start=carried(self.start, scene))
@@ -154,6 +162,9 @@ class LoadRun(Run[Branch]):
         self.found, self.jumps = list(unfinished), list(unfinished.jumps)
         self.timings |= unfinished.timings
         load = float(self.request.loads[count - 1])
+        if memory.sizes is not None:
+            self.along = Along.of(self.scene, self.request.errors_at, memory.sizes)
+            self._stand_on(unfinished[-1].scene)
         self.path.go_on(self.restored(unfinished[-1], load), load, predictor_of(memory))
 
     def restored(self, last: Equilibrium, load: float) -> State:
@@ -168,9 +179,12 @@ class LoadRun(Run[Branch]):
         try:
             with self.timed("solve"):
                 state, turn = self.path.to(float(loads[index]), self.request.at_limit == "jump")
+                if self.along is not None:
+                    state = self._on_mesh_for(self.along, state)
             with self.timed("verdicts"):
                 own, scene = self.own(state), self.scene_of(state)
-                new = record_on_borders(scene, own, holding(self.control), self.found[-1] if self.found else None, clock, self.gas)
+                before = self.found[-1] if self.found and self.found[-1].state.size == own.x.size else None
+                new = record_on_borders(scene, own, holding(self.control), before, clock, self.gas)
         except SolveError as error:
             return error.status, self._not_reached(index, str(error))
         if turn is not None:
@@ -180,6 +194,44 @@ class LoadRun(Run[Branch]):
         if self.on_step is not None:
             self.on_step(index, len(loads), new)
         return self._slack(own) if new.status is Status.SLACK else None
+
+    def _on_mesh_for(self, along: Along, state: State) -> State:
+        """The state on another mesh where this one is nearly used up for it, or much too fine. The path goes on from there.
+
+        Raises
+        ------
+        SolveError
+            Where no mesh is good enough, or the state is lost on the way.
+        """
+        if not state.x.any():
+            return state
+        share = along.share(self.potential, state)
+        if along.full(share):
+            scene = self._mesh_for(along, state, share)
+        else:
+            scene = along.smaller(self.here, self.potential, state, share) if len(self.found) % _OFTEN == 0 else None
+        if scene is None:
+            return state
+        before, memory, load = self.potential, self.path.memory, self.path.load
+        there = state_there(holding(self.control)(potential_of(scene), state))
+        there.iterations += state.iterations
+        self._stand_on(scene)
+        self.path.go_on(there, load, carried_path(memory, before.space, self.potential.space))
+        return there
+
+    def _mesh_for(self, along: Along, state: State, share: float) -> Scene | None:
+        """A mesh for a state; None where there is none and the one at hand will do."""
+        try:
+            return along.mesh_for(self.here, self.potential, state, share)
+        except SolveError:
+            if share > 1:
+                raise
+            return None
+
+    def _stand_on(self, scene: Scene) -> None:
+        """Have the mesh of a scene from here on."""
+        self.here, self.potential = scene, potential_of(scene)
+        self.path = self.new_path()
 
     @property
     def control(self) -> Control:
@@ -233,5 +285,7 @@ class LoadRun(Run[Branch]):
 
     def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
         memory = None if found is None else remembered(self.path.memory, self.potential.space.n_free + 1)
+        if memory is not None and self.along is not None:
+            memory = replace(memory, sizes=self.along.sizes)
         known = tuple(self.found) if found is None else found
         return Branch(self.scene, known, status, message, dict(self.timings), None, memory, tuple(self.jumps), self.path.solver)

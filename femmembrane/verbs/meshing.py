@@ -15,7 +15,7 @@ from ..scene import Scene
 from .arguments import check_scene
 
 if TYPE_CHECKING:
-    from ..accuracy.adapt import Shortfall
+    from ..accuracy.adapt import Along, Shortfall
     from .running import Request
 
 S = TypeVar("S")
@@ -34,12 +34,15 @@ class Chosen:
         Seconds that the choice took; empty where there was none to make.
     shortfall : Shortfall or None
         Where the accuracy ends; None where it is kept all along.
+    along : Along or None
+        What changes the mesh along the run; None for a run on one mesh.
     """
 
     scene: Scene
     request: Request
     timings: Mapping[str, float] = field(default_factory=dict)
     shortfall: Shortfall | None = None
+    along: Along | None = None
 
 
 def on_chosen_mesh(scene: Scene, request: Request) -> Chosen:
@@ -67,11 +70,12 @@ def on_chosen_mesh(scene: Scene, request: Request) -> Chosen:
     from ..accuracy.adapt import choose_and_check
 
     trial = request.trial()
-    chosen, shortfall = choose_and_check(scene, lambda on: trial.on(on).begin(on).follow(), request.errors_at)
+    changes = request.mesh_changes and not (scene.bodies or scene.follows_zones)
+    chosen, shortfall, along = choose_and_check(scene, lambda on: trial.on(on).begin(on).follow(), request.errors_at, changes)
     if shortfall is not None and not shortfall.kept:
         raise SolveError(str(shortfall), status=Status.ACCURACY_NOT_MET)
     request = (request if shortfall is None else request.up_to(shortfall.kept)).on(chosen)
-    return Chosen(chosen, request, {"mesh": time.perf_counter() - clock}, shortfall)
+    return Chosen(chosen, request, {"mesh": time.perf_counter() - clock}, shortfall, along)
 
 
 def carried(start: S, scene: Scene) -> S | Equilibrium:

@@ -62,6 +62,10 @@ class NumberRequest(LoadRequest):
             parameter.scene_at(value)
         return cls(held.controlled(scene), loads, start, solver, at_limit, throw, over=parameter.name, hold=held)
 
+    @property
+    def mesh_changes(self) -> bool:
+        return False
+
     def prepared(self, scene: Scene, on_step: OnStep | None) -> LoadRun:
         return NumberRun(scene, self, on_step)
 

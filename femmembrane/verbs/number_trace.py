@@ -83,6 +83,10 @@ class NumberTraceRequest(TraceRequest):
         return cls(start, targets, direction, int(max_steps), control, special_points, ill_posed, over=parameter.name, hold=held)
 
     @property
+    def mesh_changes(self) -> bool:
+        return False
+
+    @property
     def start_scene(self) -> Scene | None:
         """That of whatever start: its mesh may have been chosen already."""
         return self.start.scene if isinstance(self.start, Equilibrium) else super().start_scene

@@ -21,7 +21,7 @@ from ..solve.state import State
 from .state_records import OnCheckpoint, OnStep
 
 if TYPE_CHECKING:
-    from ..accuracy.adapt import Shortfall
+    from ..accuracy.adapt import Along, Shortfall
     from .meshing import Chosen
 
 #: the record of a run
@@ -37,6 +37,11 @@ class Request(ABC):
     @abstractmethod
     def errors_at(self) -> str:
         """What is held while errors are estimated: volume, center_height, or arc-length."""
+
+    @property
+    def mesh_changes(self) -> bool:
+        """Whether the mesh may change along the run."""
+        return False
 
     @property
     def start_scene(self) -> Scene | None:
@@ -75,13 +80,18 @@ class Run(ABC, Generic[R]):
         Seconds by stage.
     shortfall : Shortfall or None
         Where the accuracy ends that the mesh was chosen for; the run was asked to go no further.
+    along : Along or None
+        What changes the mesh along the run; None for a run on one mesh.
+    here : Scene
+        The scene on the mesh that the run stands on. ``scene`` has the first mesh.
     """
 
     def __init__(self, scene: Scene, potential: Potential, stages: tuple[str, ...]) -> None:
-        self.scene, self.potential = scene, potential
+        self.scene, self.potential, self.here = scene, potential, scene
         self.found: list[Equilibrium] = []
         self.timings = dict.fromkeys(stages, 0.0)
         self.shortfall: Shortfall | None = None
+        self.along: Along | None = None
 
     @property
     def over(self) -> str:
@@ -95,7 +105,7 @@ class Run(ABC, Generic[R]):
     def scene_of(self, state: State) -> Scene:
         """The scene of a state."""
         own = state.evaluation.potential
-        return self.scene.bordered(own.scene.borders) if own.follows else self.scene
+        return self.scene.bordered(own.scene.borders) if own.follows else self.here
 
     @abstractmethod
     def step(self) -> End | None:
@@ -156,4 +166,5 @@ def carry_out(
     scene, request = chosen.scene, chosen.request
     run = request.begin(scene, on_step) if unfinished is None else request.go_on(scene, unfinished, on_step)
     run.timings, run.shortfall = {**chosen.timings, **run.timings}, chosen.shortfall
+    run.along = chosen.along or run.along
     return run.follow(on_checkpoint)

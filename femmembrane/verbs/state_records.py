@@ -12,8 +12,8 @@ from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
 from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
-from ..potential import Potential
-from ..results.analyses import asked
+from ..potential import ContactFamily, Potential
+from ..results.analyses import answer_at_once
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium, recorded
 from ..results.path_memory import PathMemory
@@ -69,7 +69,8 @@ def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> Sta
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     if potential.follows:
-        potential = kept.potential
+        borders = kept.scene.borders
+        potential = potential.bordered(borders) if isinstance(potential, ContactFamily) else kept.potential
     evaluation = potential.evaluate(kept.state, kept.pressure, number)
     force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
     residual = relative_residual(potential, force, evaluation, kept.pressure)
@@ -105,8 +106,7 @@ def record(
     status = state.status if bad is None else bad.status
     own = state.evaluation
     equilibrium = recorded(scene, potential, own.x, state.pressure, own, status, state.residual, state.iterations, gas)
-    for analysis in asked(scene):
-        analysis.compute(equilibrium, previous, state.evaluation)
+    answer_at_once(equilibrium, previous, own)
     if clock is not None:  # written last, for answers take time
         store(equilibrium, seconds=time.perf_counter() - clock)
     return equilibrium
@@ -127,11 +127,14 @@ def record_on_borders(
     potential = state.evaluation.potential
     if potential.follows:
         scene = scene.bordered(potential.scene.borders)
-    if potential.follows or not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
+    followed = potential.follows and not potential.obstacles
+    if followed or not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
         return record(scene, potential, state, previous, clock, gas)
     own, there = put_on_borders(scene, state, solve)
+    if own is scene or own == scene:
+        return record(scene, potential, state, previous, clock, gas)
     new = record(own, there.evaluation.potential, there, previous, clock, gas)
-    on_branch = state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    on_branch = state.evaluation.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
     store(new, on_branch=recorded(scene, potential, *on_branch))
     return new
 

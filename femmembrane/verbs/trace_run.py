@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,8 +10,10 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
 
 import numpy as np
 
+from ..accuracy.adapt import Along
 from ..accuracy.borders import Solve, holding
-from ..checks import choice, is_number, number, sign
+from ..checks import choice, is_number, number, sign, store
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.branch import Branch
@@ -35,14 +38,17 @@ from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossin
 from ..solve.zone_events import ZoneEvent, zone_events
 from ..stability.azimuthal import azimuthal_eigenvalue
 from .arguments import check_ill_posed, check_max_steps
+from .changed_mesh import carried_path, carried_point, goes_alike, state_there
 from .meshing import carried
 from .over_number import gas_of
 from .running import End, Request, Run
-from .state_records import OnStep, predictor_of, record_on_borders, remembered, restore, resume, special_point
+from .state_records import OnStep, predictor_of, record, record_on_borders, remembered, restore, resume, special_point
 
 #: distance from a value at which a trace ends, in units of the membrane, that is none
 _AT_TARGET = 1e-9
 
+#: steps after which a much smaller mesh is looked for
+_OFTEN = 8
 #: most numbers of waves that are tried one after the other for the first onset of all
 _MOST_WAVES = 20
 if TYPE_CHECKING:
@@ -105,6 +111,10 @@ class TraceRequest(Request):
     @property
     def errors_at(self) -> str:
         return "arc-length"
+
+    @property
+    def mesh_changes(self) -> bool:
+        return True
 
     @property
     def start_scene(self) -> Scene | None:
@@ -227,6 +237,8 @@ class TraceRun(Run[Branch]):
         self._points: Iterator[BranchPoint] | None = None
         self._crossing: Crossing | None = None
         self._sources = Watch()
+        self._again = False
+        self._known = {(scene.mesh, scene.degree): scene}
 
     # --- where it sets out
 
@@ -264,6 +276,9 @@ class TraceRun(Run[Branch]):
             raise InputError(
                 "start", "a Branch without memory", "a whole Branch from fm.trace is allowed; give start=branch[-1] for others"
             )
+        if memory.sizes is not None:
+            self.along = Along.of(self.scene, self.request.errors_at, memory.sizes)
+            self._stand_on(self.same(start[memory.regular - 1].scene))
         self.tracer.path, self.tracer.step, self.tracer.known = predictor_of(memory), memory.step, memory.known
         self.point = self.restored(start[memory.regular - 1], memory)
         # the scene of the start may differ in what changes no equilibrium, and all rows of a branch must have the same columns
@@ -283,7 +298,10 @@ class TraceRun(Run[Branch]):
 
     def same(self, scene: Scene) -> Scene:
         """A scene of the branch that is continued, with the analyses of this one."""
-        return self.scene if scene.mesh == self.scene.mesh else self.scene.replace(mesh=scene.mesh)
+        key = scene.mesh, scene.degree
+        if key not in self._known:
+            self._known[key] = self.scene.replace(mesh=scene.mesh, degree=scene.degree)
+        return self._known[key]
 
     # --- how it is stepped
 
@@ -294,6 +312,8 @@ class TraceRun(Run[Branch]):
         try:
             return self._step()
         except SolveError as error:
+            if error.status is Status.NOT_RESOLVED:
+                return error.status, str(error)
             near = self.potential_at(self.point).distance_to_sources(self.point.state.x)
             return stopped_by_source(error, near, self.potential.space.unit) or (error.status, str(error))
 
@@ -326,13 +346,21 @@ class TraceRun(Run[Branch]):
             if (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
                 return end
             self._points = trace_points(self.problem, self.point, self.tracer)
+        before = None if self.along is None or self._again else replace(self.tracer, path=replace(self.tracer.path))
         with self.timed("solve"):
             new = next(self._points)
         segment = Segment(self.problem, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
         met = [point for q, v in self.request.targets.items() for point in segment.crossings(self.quantity(q), v)]
         last = min(met, key=lambda p: p.sigma, default=None)
-        if unresolved := state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state)):
+        unresolved = state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state))
+        share = self._share(last or new, bool(unresolved))
+        if self.along is not None and before is not None and share > 1:
+            return self._step_again(self.along, before, last or new, share)
+        if unresolved:
             return Status.NOT_RESOLVED, f"at {self.place(last or new)} {unresolved}"
+        if share > 1:
+            return Status.ACCURACY_NOT_MET, f"beyond {self.place(self.point)} no mesh keeps the accuracy of a step"
+        self._again = False
         closing = self._look_for_special_points(segment, last)
         last = closing or last
         self._add(last or new, clock)
@@ -342,7 +370,60 @@ class TraceRun(Run[Branch]):
         if last is not None and not wellposed.unresolved_source(self.potential_at(last), last.state.x):
             return self._explained(Status.CONVERGED, "")
         self.point, self.regular = new, len(self.found)
-        return self._ill_posed(new) or self._at_source(new) or self.at_bound(new)
+        if (end := self._ill_posed(new) or self._at_source(new) or self.at_bound(new)) is None and self.along is not None:
+            self._change_mesh(self.along, share)
+        return end
+
+    # --- on which mesh
+
+    def _share(self, point: BranchPoint, unresolved: bool) -> float:
+        """The estimated error of a point over the accuracy that is asked for, where the mesh may change for it."""
+        if self.along is None:
+            return 0.0
+        return np.inf if unresolved else self.along.share(self.potential, point.state)
+
+    def _step_again(self, along: Along, before: Tracer, beyond: BranchPoint, share: float) -> End | None:
+        """Stand where the step set out, on a mesh for the point that it led to; the end where there is none."""
+        try:
+            scene = along.mesh_for(self.here, self.potential, beyond.state, share)
+            self.tracer, self._again = before, True
+            self._go_over(scene)
+        except SolveError as error:
+            return Status.ACCURACY_NOT_MET, f"beyond {self.place(self.point)} {error}"
+        self.made -= 1
+        return None
+
+    def _change_mesh(self, along: Along, share: float) -> None:
+        """Another mesh for the steps to come, where this one is nearly used up or much too fine; the same one where there is none."""
+        with contextlib.suppress(SolveError):
+            if along.full(share):
+                self._go_over(along.mesh_for(self.here, self.potential, self.point.state, share), alike=True)
+            elif self.regular % _OFTEN == 0 and (smaller := along.smaller(self.here, self.potential, self.point.state, share)) is not None:
+                self._go_over(smaller, alike=True)
+
+    def _go_over(self, scene: Scene, *, alike: bool = False) -> None:
+        """Stand at the last point on another mesh, whose record takes the place of the one before; where a fold lies between the two and
+        they are to be alike, on the same mesh as before."""
+        onto = potential_of(scene)
+        state = state_there(self.solve(self.point)(onto, self.point.state))
+        point = carried_point(self.point, state, self.potential, onto)
+        if alike and not goes_alike(self.point, point, list(self.problem.folds.values())):
+            return
+        path = carried_path(self.tracer.path, self.potential.space, onto.space)
+        path.point[-1:], path.slope[-1:] = [point.z], [point.tangent]
+        self.tracer.path, self.tracer.known = path, point.state.correction
+        self._stand_on(scene)
+        self.point, self._points = point, None
+        state.iterations += self.found[-1].iterations
+        new = record(scene, onto, state)
+        store(new, seconds=self.found[-1].seconds)
+        self.found[-1] = new
+
+    def _stand_on(self, scene: Scene) -> None:
+        """Have the mesh of a scene from here on."""
+        self.here, self.potential = scene, potential_of(scene)
+        self._known.setdefault((scene.mesh, scene.degree), scene)
+        self.problem = BranchProblem(self.potential)
 
     def quantity(self, name: str) -> Followed:
         """The quantity of the curve that a target names."""
@@ -393,7 +474,8 @@ class TraceRun(Run[Branch]):
     def _add(self, point: BranchPoint, clock: float) -> None:
         with self.timed("verdicts"):
             scene, state = self.scene_of(point.state), self.own(point.state)
-            new = record_on_borders(scene, state, self.solve(point), self.found[-1] if self.found else None, clock)
+            solve: Solve = lambda onto, found: self.solve(point)(onto, found)  # noqa: E731  # hardly ever asked for
+            new = record_on_borders(scene, state, solve, self.found[-1] if self.found else None, clock)
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.request.max_steps + 1, new)
@@ -434,7 +516,9 @@ class TraceRun(Run[Branch]):
         """Whether a branch point before the end of the trace is the one at which it set out."""
         if len(self.found) < 3 or (last is not None and last.sigma < point.sigma):
             return False
-        return same_crossing(self.potential, self.found[0].state, point.state.x)
+        first = self.found[0]
+        at_first = first.state if first.scene is self.here else transferred(first.potential.space, first.state, self.potential.space)
+        return same_crossing(self.potential, at_first, point.state.x)
 
     def _look_for_onsets(self, segment: Segment[BranchPoint], end: BranchPoint) -> None:
         """Where the smallest eigenvalue for n waves, known at both ends, passes zero."""
@@ -486,7 +570,14 @@ class TraceRun(Run[Branch]):
     def result(self, status: Status, message: str, found: Sequence[Equilibrium] | None = None) -> Branch:
         path = remembered(self.tracer.path, len(self.point.z))
         memory = TraceMemory(
-            path.sigma, path.points, path.slopes, self.tracer.step, self.regular, tuple(self.unexplained), self.tracer.known
+            path.sigma,
+            path.points,
+            path.slopes,
+            self.tracer.step,
+            self.regular,
+            tuple(self.unexplained),
+            self.tracer.known,
+            sizes=None if self.along is None else self.along.sizes,
         )
         special = None if self.special is None else tuple(self.special)
         known = tuple(self.found) if found is None else found

@@ -216,7 +216,7 @@ class ContactEvaluation(Evaluation):
     def pressed_flat(self) -> Mask | None:
         potential = cast(ContactPotential, self.potential)
         degree, n_elements = potential.space.degree, potential.space.n_elements
-        on = np.ones(degree * n_elements + 1, dtype=bool)  # a node that cannot move at all takes part
+        on: Mask = np.ones(degree * n_elements + 1, dtype=bool)  # a node that cannot move at all takes part
         on[potential.nodes] = self.held
         on[-1] &= on[0] or not potential.space.closed
         inner = cast("Mask", np.stack([on[j : j + degree * n_elements : degree] for j in range(degree + 1)]).all(axis=0))

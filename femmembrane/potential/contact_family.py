@@ -180,6 +180,11 @@ class ContactFamily(ContactPotential, Family):
             found[1:, alone] = 0.0
         return found
 
+    def advance(self, evaluation: Evaluation) -> float:
+        if not isinstance(evaluation, ContactEvaluation):
+            return 0.0
+        return float(np.abs(self.drift(evaluation)[0]).max(initial=0.0)) / self.space.unit
+
     def number_rates(self, evaluation: Evaluation, pressure: float) -> tuple[Array, Array | None]:
         """Derivative of the balance of the tangential displacements with respect to the number, and the shift of held nodes."""
         if not isinstance(evaluation, ContactEvaluation):

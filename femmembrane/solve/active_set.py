@@ -13,6 +13,7 @@ border, solved by Broyden's method. Its forces converge at twice the order of th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
@@ -53,9 +54,9 @@ _PULL, _INSIDE = 1e-3, 1e-6
 
 
 class Once(Protocol):
-    """A corrector on a smooth potential."""
+    """A corrector on a smooth potential; ``damped`` for a guess that is not next to a solution."""
 
-    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult: ...
+    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = ...) -> NewtonResult: ...
 
 
 def settled(once: Once, control: Control, potential: Potential, x: Array, pressure: float, magnetic: float) -> NewtonResult:
@@ -97,8 +98,15 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
         result = once(root.holding(held), control=control, x=x, pressure=pressure)
         spent += result.iterations
         result.iterations = spent
+        if result.status is not Status.CONVERGED and len(tried) > 1:  # the solution on the set before need not be next to this one
+            result = once(root.holding(held), control=control, x=x, pressure=pressure, damped=True)
+            result.iterations = spent = spent + result.iterations
         if result.status is not Status.CONVERGED:
-            return result
+            smoother = [s for s in (_smoothed(root, held, True), _smoothed(root, held, False)) if s.tobytes() not in tried]
+            if not smoother or len(tried) == MOST_SETS:
+                return result
+            held = smoother[0]
+            continue
         evaluation = cast("ContactEvaluation", result.evaluation)
         following = root.judged(evaluation._raw, evaluation.gaps, result.pressure)
         if (following == held).all():
@@ -109,6 +117,15 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
             result.status = Status.NOT_CONVERGED
             return result
         x, pressure, held = result.x, result.pressure, following
+
+
+def _smoothed(root: ContactPotential, held: Mask, fill: bool) -> Mask:
+    """A set without holes shorter than an element, or without zones as short: a guess next to a border may have them from round-off."""
+    new, at = held.copy(), np.flatnonzero(held == fill)
+    for one, other in pairwise(at):
+        if 1 < other - one <= root.space.degree and root.nodes[other] - root.nodes[one] == other - one:
+            new[one + 1 : other] = fill
+    return new
 
 
 def _one_changed(evaluation: ContactEvaluation, held: Mask, following: Mask) -> Mask:

@@ -323,8 +323,8 @@ class NumberProblem(CurveProblem[NumberPoint]):
             return None, found.iterations
         return self._point(found, orientation), found.iterations
 
-    def _on_set(self, family: Family, z: Array, borders: Borders, closing: _Closing, tolerance: float) -> _Corrected:
-        """Newton's method on a family that is smooth."""
+    def _on_set(self, family: Family, z: Array, borders: Borders, closing: _Closing, tolerance: float, patient: bool = False) -> _Corrected:
+        """Newton's method on a family that is smooth; with patience corrections need not shrink from the first one on."""
         previous = np.inf
         for iteration in range(_MAX_ITERATIONS + 1):
             if isinstance(family, HeldFamily):
@@ -346,7 +346,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
             )
             if size <= tolerance:
                 return _Corrected(iteration, equations, row, float(size))
-            if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * tolerance):
+            if not np.isfinite(size) or (size > (2.0 if patient else 0.5) * previous and size > 1e3 * tolerance):
                 return _Corrected(iteration)
             previous = size
             z = self.settled(z + change)
@@ -357,9 +357,10 @@ class NumberProblem(CurveProblem[NumberPoint]):
         known: dict[int, _Corrected] = {}
         number = float(z[-1])
 
-        def once(potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult:
+        def once(potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = False) -> NewtonResult:
             nonlocal number
-            found = self._on_set(cast("Family", potential), np.concatenate([x, [pressure, number]]), borders, closing, tolerance)
+            guess, on = np.concatenate([x, [pressure, number]]), cast("Family", potential)
+            found = self._on_set(on, guess, borders, closing, tolerance, patient=damped)
             last = found.last
             if last is None:
                 evaluation = potential.evaluate(x, pressure, number)

@@ -166,7 +166,8 @@ class _Page:
             [
                 names.get(str(p.kind), str(p.kind))
                 + (f", n = {p.azimuthal}" if p.azimuthal else "")
-                + (f", {word}" if (word := plots.after(p)) else ""),
+                + (f", {word}" if (word := plots.after(p)) else "")
+                + (f": {p.zone}" if p.zone else ""),
                 *(p.equilibrium.number(name) for name in over),
                 *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),

@@ -471,3 +471,21 @@ def test_a_mesh_too_coarse_for_an_edge_is_said_to_be_so():
     assert 16 * 4 * (1 / 16) / 0.01 < needed < 16 * 4 * (4 / 16) / 0.01  # elements of 1/16, stretched up to four times
     fine = fm.Scene(material=NH, mesh=fm.disc(16), prestretch=1.1, obstacles=[fm.Cylinder(0.5, 0.3, 0.6, 0.3)])
     assert fm.trace(fine, start=0.45, until={"pressure": 1.0}).status is fm.Status.CONVERGED
+
+
+def test_contact_across_the_seam_of_a_closed_meridian_is_one_zone():
+    """A torus between two plates: the zone at its top, where the meridian begins and ends, is the mirror image of that at its bottom."""
+    scene = fm.Scene(
+        material=fm.Gent(30.0), mesh=fm.torus(aspect=20, elements=32), obstacles=[fm.Plane(1.02), fm.Plane(-1.02, side="above")]
+    )
+    volume = 2.0 * potential_of(scene).space.reference_volume
+    contact = fm.equilibrium(scene, volume=volume).contact
+    low, top = sorted(contact.zones, key=lambda zone: zone.force)
+    assert top.start < 2 * np.pi < top.stop
+    assert top.followed
+    assert low.followed
+    assert (2 * np.pi - top.start, top.stop - 2 * np.pi) == pytest.approx((low.stop - np.pi, np.pi - low.start)[::1], abs=1e-7)
+    assert (top.force, top.area) == pytest.approx((-low.force, low.area), rel=1e-8)
+    s = np.linspace(top.start, top.stop, 21)[1:-1]
+    assert contact.pressure(s % (2 * np.pi)) == pytest.approx(contact.pressure(3 * np.pi - s), rel=1e-5)
+    assert np.abs(contact.gap(s % (2 * np.pi))).max() == 0

@@ -242,6 +242,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "amplitude": Quantity("root mean square of the part of the displacement that has waves around the axis, over R0"),
     "shift": Quantity("displacement of the pole across the axis, over R0"),
     "harmonics": Quantity("number of harmonics around the axis beside the constant one", type=int),
+    "wave_size": Quantity("size of the part of the displacement that has waves, over R0"),
     "truncation": Quantity("estimated root mean square of the harmonics left out, over R0"),
     "postbuckling": Quantity("whether it sets in gradually (supercritical) or with a jump (subcritical) at a held volume", type=str),
     "postbuckling_coefficient": Quantity("its coefficient b of Koiter at a held volume, over mu T R0^2", words="coefficient b"),

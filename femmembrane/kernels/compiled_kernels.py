@@ -57,6 +57,7 @@ class CompiledKernels:
         return y
 
     def inner(self, band: Array, half_bandwidth: int, x: Array, y: Array) -> float:
+        x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
         own: float = self.module.inner(np.ascontiguousarray(band.T), len(x), half_bandwidth, x, y)
         return own
 

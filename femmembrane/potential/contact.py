@@ -127,7 +127,10 @@ class Reduction:
         return v
 
     def band(self, band: Array, kd: int, diagonal: Array | None = None) -> Array:
-        """A symmetric band matrix in the unknowns that are left; in the empty places a diagonal, left out: the size of its own."""
+        """A symmetric band matrix in the unknowns that are left; in the empty places a diagonal, left out: the largest one.
+
+        The normal stiffness of a held node would not do: it vanishes where a stress does, and would stand among the eigenvalues.
+        """
         n, depth = self.size, band.shape[0]
         flat = band.T.ravel().copy()  # A[i, j] at j depth + 2 kd + i - j
 
@@ -137,7 +140,7 @@ class Reduction:
 
         near = np.arange(-kd - 1, kd + 2)
         flat = np.append(flat, 0.0)  # what lies outside of the band
-        own = np.abs(flat[at(self.out, self.out)]) if diagonal is None else diagonal
+        own = np.full(self.out.shape, np.abs(band[2 * kd]).max(initial=0.0)) if diagonal is None else diagonal
         if self.iu.size:
             others = self.iu[:, None] + near
             for order in (1, -1):  # rows, then columns
@@ -224,6 +227,15 @@ class ContactEvaluation(Evaluation):
     def row(self, row: Array) -> Array:
         potential = cast(ContactPotential, self.potential)
         return np.asarray(row @ potential.to_root) if potential.borders else row
+
+    def pressed_flat(self) -> Mask | None:
+        potential = cast(ContactPotential, self.potential)
+        degree, n_elements = potential.space.degree, potential.space.n_elements
+        on: Mask = np.ones(degree * n_elements + 1, dtype=bool)  # a node that cannot move at all takes part
+        on[potential.nodes] = self.held
+        on[-1] &= on[0] or not potential.space.closed
+        inner = cast("Mask", np.stack([on[j : j + degree * n_elements : degree] for j in range(degree + 1)]).all(axis=0))
+        return inner if self.held.any() and inner.any() else None
 
     def released(self) -> ContactEvaluation | None:
         potential = cast(ContactPotential, self.potential)

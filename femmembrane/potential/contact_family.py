@@ -23,7 +23,7 @@ from ..physics.obstacles import Obstacle, rows_of
 from ..scene.variation import Parameter
 from .contact import ACROSS, Borders, ContactEvaluation, ContactPotential, Held, Mask
 from .evaluation import Evaluation
-from .family import Family
+from .family import Family, FoldDerivatives
 from .of_scene import potential_of
 from .potential import Potential
 
@@ -179,6 +179,11 @@ class ContactFamily(ContactPotential, Family):
             found[1:, alone] = 0.0
         return found
 
+    def advance(self, evaluation: Evaluation) -> float:
+        if not isinstance(evaluation, ContactEvaluation):
+            return 0.0
+        return float(np.abs(self.drift(evaluation)[0]).max(initial=0.0)) / self.space.unit
+
     def number_rates(self, evaluation: Evaluation, pressure: float) -> tuple[Array, Array | None]:
         """Derivative of the balance of the tangential displacements with respect to the number, and the shift of held nodes."""
         if not isinstance(evaluation, ContactEvaluation):
@@ -192,13 +197,60 @@ class ContactFamily(ContactPotential, Family):
             shift[iu] = -gaps.n_rho[held] * rate
             shift[iw] = -gaps.n_eta[held] * rate
             shift[n] = 0.0
-            force[:-1] += kernels().product(evaluation.raw.band, self.space.half_bandwidth, shift[:-1])
-            if (spring := evaluation.raw.spring) is not None:
-                force[:-1] += spring * float(spring @ shift[:-1])
+            force[:-1] += self._stiff(evaluation.raw, shift[:-1])
             work = evaluation.forces[held]
             np.subtract.at(force, iu, work * a)
             np.subtract.at(force, iw, work * b)
         return evaluation.reduction.projected(force[:-1]), shift[:-1]
+
+    def fold_rates(self, evaluation: Evaluation, pressure: float, mode: Array, q: float) -> tuple[FoldDerivatives, Array | None]:
+        """Derivatives of the form of the tangential displacements, for a mode that bodies leave.
+
+        A held node goes along its body: with the tangential displacement a of a node its position has the second derivative -k n a^2, k the
+        curvature of the body. So the form is v . (E'' - P V'') v - sum k a^2 n . (E' - P V') - 2 q V' . v.
+        """
+        if not isinstance(evaluation, ContactEvaluation):
+            return super().fold_rates(evaluation, pressure, mode, q)
+        raw, gaps, n = evaluation.raw, evaluation.gaps, self.space.n_free
+        force, shift = self.number_rates(evaluation, pressure)
+        t = self.fold_derivatives(raw.x, pressure, evaluation.factor, mode, q)
+        iu, iw = self.place
+        bent = evaluation.held & (iu < n) & (iw < n) & (gaps.curvature != 0)
+        iu, iw, a, b, k = iu[bent], iw[bent], gaps.n_rho[bent], gaps.n_eta[bent], gaps.curvature[bent]
+        along = -mode[iu] * b + mode[iw] * a
+
+        def normal(v: Array) -> Array:
+            return a * v[iu] + b * v[iw]
+
+        inward = np.zeros(n)
+        inward[iu], inward[iw] = k * along**2 * a, k * along**2 * b
+        row = t.cubic - self._stiff(raw, inward)
+        turned = 2 * k * along * (q * normal(raw.volume_gradient) - normal(self._stiff(raw, mode)))
+        row[iu] -= turned * b
+        row[iw] += turned * a
+        pressed = t.cubic_pressure + float(inward @ raw.volume_gradient)
+        if self.parameter.shapes or self._way is not None:
+            number = self._form_rate(evaluation, pressure, evaluation.reduced(mode), q, np.zeros(n) if shift is None else shift)
+        else:
+            number = t.cubic_number - float(inward @ self.number_derivative(raw.x, pressure, evaluation.factor))
+        return FoldDerivatives(evaluation.reduction.projected(row), pressed, number, force), shift
+
+    def _stiff(self, raw: Evaluation, v: Array) -> Array:
+        """(E'' - P V'') v, without what bodies take."""
+        own = kernels().product(raw.band, self.space.half_bandwidth, v)
+        return own if raw.spring is None else own + raw.spring * float(raw.spring @ v)
+
+    def _form_rate(self, evaluation: ContactEvaluation, pressure: float, reduced: Array, q: float, shift: Array) -> float:
+        """Derivative of that form with respect to the number while held nodes go with their bodies."""
+        number, held = evaluation.factor, self.holding(evaluation.held)
+        step = _STEPS[0] * max(abs(number), self.space.unit)
+        found = 0.0
+        for j, weight in _CENTRAL.items():
+            at = number + j * step
+            there = held.evaluate(held.placed(evaluation.x + j * step * shift, at), pressure, at)
+            mode = there.expanded(reduced)
+            found += weight / step * (there.inner(mode, mode) - 2 * q * float(there.volume_gradient @ mode))
+        return found
 
     def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
         if self.parameter.name.startswith("obstacle."):
@@ -216,6 +268,12 @@ class HeldFamily(Held, ContactFamily):
 
     def number_derivative(self, x: Array, pressure: float, number: float) -> Array:
         return self.base.number_derivative(x, pressure, number)
+
+    def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
+        return self.base.fold_derivatives(x, pressure, number, mode, q)
+
+    def holding(self, held: Mask) -> HeldFamily:
+        return self.base.holding(held)
 
     def volume_derivative(self, x: Array, number: float) -> float:
         return self.base.volume_derivative(x, number)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor, SpringFactor
@@ -31,10 +32,8 @@ class Evaluation:
         a, where the second derivatives are the band plus a a^T: with a total charge, which couples all points.
     """
 
-    __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
-        *("potential", "elements", "factor", "spring", "_forces", "_densities", "_band", "_negative", "_known"),
-    )
+    _band: Array | None = None
+    _negative: int | None = None
 
     def __init__(
         self,
@@ -47,8 +46,6 @@ class Evaluation:
     ) -> None:
         self.x, self.potential, self.elements, self.factor, self.spring = x, potential, elements, factor, spring
         self.elastic_energy, self.magnetic_energy, self.volume, self.finite, self._forces, self._densities = answer
-        self._band: Array | None = None
-        self._negative: int | None = None
         self._known: dict[str, float] = {}
 
     @property
@@ -123,6 +120,10 @@ class Evaluation:
     def row(self, row: Array) -> Array:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row
+
+    def pressed_flat(self) -> NDArray[np.bool_] | None:
+        """Which elements lie on a body all over, shape (n_elements,), so that no short wave lifts them; None where none does."""
+        return None
 
     def released(self) -> Evaluation | None:
         """The same state without the nodes that bodies hold by no force; None where there are none."""

@@ -205,6 +205,10 @@ class Family(Potential):
         own = self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
         return own if self.charged is None else own + self.charged.number_derivative(x, number)
 
+    def advance(self, evaluation: Evaluation) -> float:
+        """How far bodies come to a membrane at a state for each unit of the number, over the size of the membrane."""
+        return 0.0
+
     def number_rates(self, evaluation: Evaluation, pressure: float) -> tuple[Array, Array | None]:
         """:meth:`number_derivative` at a state, and how bodies that hold nodes move these with the number; None where none does."""
         return self.number_derivative(evaluation.x, pressure, evaluation.factor), None
@@ -218,6 +222,10 @@ class Family(Potential):
         if not self.moves:
             return 0.0
         return float(self._number_rows(x, 0.0, number)[4].sum())
+
+    def fold_rates(self, evaluation: Evaluation, pressure: float, mode: Array, q: float) -> tuple[FoldDerivatives, Array | None]:
+        """:meth:`fold_derivatives` at a state, and how bodies that hold nodes move these with the number; None where none does."""
+        return self.fold_derivatives(evaluation.x, pressure, evaluation.factor, mode, q), None
 
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""

@@ -285,11 +285,12 @@ class Equilibrium:
             For an unknown control, or for arguments that do not go together.
         """
         key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
-        if electric is None and isinstance(azimuthal, (int, str)) and key in self._answers:
+        named = control is None or isinstance(control, str)
+        if electric is None and named and isinstance(azimuthal, (int, str)) and key in self._answers:
             known: Verdict = self._answers[key]
             return known
         counted = isinstance(azimuthal, (int, np.integer)) or (isinstance(azimuthal, str) and azimuthal == ALL)
-        if not (control is None or isinstance(control, str)) or not counted:
+        if not named or not counted:
             raise InputError(
                 "control" if counted else "azimuthal", control or azimuthal, 'a name and a number are allowed, or azimuthal="all"'
             )

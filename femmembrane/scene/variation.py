@@ -147,8 +147,13 @@ class Parameter:
         index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
         if part in ("load", "obstacle"):
             owners: Any = getattr(self.scene, _LISTS[part])
-            changed = dataclasses.replace(owners[index], **{name: value})
-            return self.scene.replace(**{_LISTS[part]: (*owners[:index], changed, *owners[index + 1 :])})
+            changed = {_LISTS[part]: (*owners[:index], dataclasses.replace(owners[index], **{name: value}), *owners[index + 1 :])}
+            try:
+                return self.scene.replace(**changed)
+            except InputError:
+                if part == "load" or self.scene.squeezed:
+                    raise
+            return self.scene.replace(**changed, squeezed=True)
         sources: list[Any] = list(self.scene.sources)
         sources[index] = dataclasses.replace(sources[index], **{name: value})
         scales = self.scene.scales

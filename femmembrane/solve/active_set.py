@@ -13,9 +13,11 @@ border, solved by Broyden's method. Its forces converge at twice the order of th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Status
 from ..potential import Array, Potential
@@ -51,9 +53,9 @@ _PULL, _INSIDE = 1e-3, 1e-6
 
 
 class Once(Protocol):
-    """A corrector on a smooth potential."""
+    """A corrector on a smooth potential; ``damped`` for a guess that is not next to a solution."""
 
-    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult: ...
+    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = ...) -> NewtonResult: ...
 
 
 def settled(once: Once, control: Control, potential: Potential, x: Array, pressure: float, magnetic: float) -> NewtonResult:
@@ -94,8 +96,15 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
         result = once(root.holding(held), control=control, x=x, pressure=pressure)
         spent += result.iterations
         result.iterations = spent
+        if result.status is not Status.CONVERGED and len(tried) > 1:  # the solution on the set before need not be next to this one
+            result = once(root.holding(held), control=control, x=x, pressure=pressure, damped=True)
+            result.iterations = spent = spent + result.iterations
         if result.status is not Status.CONVERGED:
-            return result
+            smoother = [s for s in (_smoothed(root, held, True), _smoothed(root, held, False)) if s.tobytes() not in tried]
+            if not smoother or len(tried) == MOST_SETS:
+                return result
+            held = smoother[0]
+            continue
         evaluation = cast("ContactEvaluation", result.evaluation)
         following = root.judged(evaluation._raw, evaluation.gaps, result.pressure)
         if (following == held).all():
@@ -106,6 +115,15 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
             result.status = Status.NOT_CONVERGED
             return result
         x, pressure, held = result.x, result.pressure, following
+
+
+def _smoothed(root: ContactPotential, held: Mask, fill: bool) -> Mask:
+    """A set without holes shorter than an element, or without zones as short: a guess next to a border may have them from round-off."""
+    new, at = held.copy(), np.flatnonzero(held == fill)
+    for one, other in pairwise(at):
+        if 1 < other - one <= root.space.degree and root.nodes[other] - root.nodes[one] == other - one:
+            new[one + 1 : other] = fill
+    return new
 
 
 def _one_changed(evaluation: ContactEvaluation, held: Mask, following: Mask) -> Mask:
@@ -336,18 +354,74 @@ def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
     """Forces along the normal of the elements beyond the borders, over the largest forces that meet at a node."""
     evaluation = cast("ContactEvaluation", result.evaluation)
     potential, space = cast("ContactPotential", evaluation.potential), evaluation.potential.space
-    density = evaluation.force_density.reshape(2, 4 * space.n_quadrature, space.n_elements)
     scales = evaluation.force_scale(result.pressure)
     found = []
     for border in borders:
-        element, local = (border.end, 0) if border.before else (border.end - 1, space.degree)
-        forces = space.table.T @ (density[0][:, element] - result.pressure * density[1][:, element])
         node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
         n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
-        along, across = _at_end(potential, evaluation, result.pressure, border)
+        along, across = _end_force(evaluation, result.pressure, border)
         scale = abs(n_rho) * scales[0] + abs(n_eta) * scales[1]
-        found.append(((forces[local] - along) * n_rho + (forces[space.degree + 1 + local] - across) * n_eta) / scale)
+        found.append((along * n_rho + across * n_eta) / scale)
     return np.array(found)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSide:
+    """The element beyond a border of contact, seen from the border.
+
+    Attributes
+    ----------
+    nodes : ndarray of int
+        Places of its nodes among those that bodies can hold.
+    slope : ndarray
+        What makes the derivative at the border, along the meridian, of values at these nodes.
+    bend : float
+        Second derivative of the gap there.
+    tension : float
+        Force across the circle over the deformed length for each unit of the parameter, positive where contact is before the border.
+    """
+
+    nodes: NDArray[np.int64]
+    slope: Array
+    bend: float
+    tension: float
+
+    def motion(self, gaps: Array) -> float:
+        """How far the border moves with a change of the gaps at all nodes: where the gap and its slope are zero."""
+        return -float(self.slope @ gaps[self.nodes]) / self.bend
+
+
+def free_sides(evaluation: ContactEvaluation, pressure: float) -> list[FreeSide]:
+    """The elements beyond the borders that ends of elements follow."""
+    potential = cast("ContactPotential", evaluation.potential)
+    degree, found = potential.space.degree, []
+    rho, eta = potential.positions(evaluation.x, evaluation.factor)
+    place = {int(node): k for k, node in enumerate(potential.nodes)}
+    for end, s in potential.borders:
+        before = not evaluation.held[place[end * degree + 1]]
+        step = 1 if before else -1
+        if degree == 1 or any(end * degree + j * step not in place for j in range(degree + 1)):
+            continue
+        nodes = np.array([place[end * degree + j * step] for j in range(degree + 1)])
+        h = potential.parameters[nodes[-1]] - s
+        powers = np.linalg.inv(np.vander((potential.parameters[nodes] - s) / h, increasing=True))
+        slope, bend = powers[1] / h, 2 * float(powers[2] @ evaluation.gaps.gap[nodes]) / h**2
+        pull = _end_force(evaluation, pressure, Border(end, before))
+        if bend > 0:
+            speed = np.hypot(slope @ rho[nodes], slope @ eta[nodes])
+            found.append(FreeSide(nodes, slope, bend, step * float(np.hypot(*pull) / speed)))
+    return found
+
+
+def _end_force(evaluation: ContactEvaluation, pressure: float, border: Border) -> tuple[float, float]:
+    """Force along rho and along z at the end of the element beyond a border."""
+    potential = cast("ContactPotential", evaluation.potential)
+    space = potential.space
+    density = evaluation.force_density.reshape(2, 4 * space.n_quadrature, space.n_elements)
+    element, local = (border.end, 0) if border.before else (border.end - 1, space.degree)
+    forces = space.table.T @ (density[0][:, element] - pressure * density[1][:, element])
+    along, across = _at_end(potential, evaluation, pressure, border)
+    return float(forces[local] - along), float(forces[space.degree + 1 + local] - across)
 
 
 def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure: float, border: Border) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from .newton import correct
 from .state import State, flat_state
 from .stepping import march
 from .ways import CORRECTIONS, along, caught, from_guess, sound, well_posed
+from .wellposed import is_slack
 
 if TYPE_CHECKING:
     from ..potential.contact import ContactPotential
@@ -131,6 +132,9 @@ def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
         state = None
         with suppress(SolveError):
             state = inflated(bare, first)
+        if state is not None and potential.scene.tension_field:
+            state = _off_bodies(potential, state)
+            first = first if state is None else state.volume
         if state is not None and potential.touching(state.x) > 0:
             break
         if first == rest:
@@ -165,6 +169,24 @@ def stopped(potential: Potential, control: Control, left: State) -> State | None
 
     found = caught(potential, control, states())
     return found if found is not None and sound(found) else None
+
+
+def _off_bodies(potential: ContactPotential, state: State) -> State | None:
+    """The largest volume, by tenths, to which a tension field can be let down from a state so that it touches no body; None where it is
+    slack before. From rest it could not be found: at small volumes a tension field is slack.
+    """
+    rest, bare = potential.space.reference_volume, potential.without_bodies
+    tenth = (state.volume - rest) / 10
+    for _ in range(9):
+        if is_slack(bare, state):
+            return None
+        if potential.touching(state.x) > 0:
+            break
+        try:
+            state = march(bare, state, VolumeControl, state.volume, state.volume - tenth, magnetic=0.0)[-1]
+        except SolveError:
+            return None
+    return state
 
 
 def _drawn_to(potential: Potential, drawn: State, volume: float) -> State | None:

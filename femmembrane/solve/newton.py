@@ -107,7 +107,7 @@ def _corrected(
         # good enough, but the load that was asked for is to be met exactly
         done = size <= tolerance and (previous <= tolerance or equations.on_control) and equations.balanced(dp)
         done = done or (0.5 * previous < size <= SOFT and equations.at_round_off)
-        stalled = not (done or size < math.inf) or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
+        stalled = not size < math.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if stalled and size <= 100 * SOFT and not done:
             before, unbalance = unbalance, equations.residual
             # along a soft direction corrections are round-off, while the forces are balanced or still come into balance

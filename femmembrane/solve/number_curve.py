@@ -130,6 +130,9 @@ class Equations:
     def linearise(self) -> None:
         raise NotImplementedError
 
+    def let_go(self) -> None:
+        """Let the borders of contact move with the state from here on: corrections leave them in their places, and rates do not."""
+
     def jacobian(self, row: Array) -> WideBorder:
         """Of (R, g, row . z) with respect to (x, P, m), without what bodies do to x."""
         rows = [self.gap_row, row]
@@ -248,6 +251,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
         """Of the derivatives of R, g and the arc length: det [K, b; b^T, 0] = -(b . K^-1 b) det K, and the dense part of the border."""
         equations = self._there(point.state.evaluation, point.z, point.borders)
         equations.factorise()
+        equations.let_go()
         deflated = equations.factor.determinant_sign() * (1 if equations.null_gap > 0 else -1)  # the gap is -1/(b . K^-1 b)
         return deflated * equations.jacobian(equations.row(point.dual)).determinant_sign()
 
@@ -319,8 +323,8 @@ class NumberProblem(CurveProblem[NumberPoint]):
             return None, found.iterations
         return self._point(found, orientation), found.iterations
 
-    def _on_set(self, family: Family, z: Array, borders: Borders, closing: _Closing, tolerance: float) -> _Corrected:
-        """Newton's method on a family that is smooth."""
+    def _on_set(self, family: Family, z: Array, borders: Borders, closing: _Closing, tolerance: float, patient: bool = False) -> _Corrected:
+        """Newton's method on a family that is smooth; with patience corrections need not shrink from the first one on."""
         previous = np.inf
         for iteration in range(_MAX_ITERATIONS + 1):
             if isinstance(family, HeldFamily):
@@ -341,8 +345,8 @@ class NumberProblem(CurveProblem[NumberPoint]):
                 abs(change[-1]) / max(self.scale, abs(z[-1])),
             )
             if size <= tolerance:
-                return _Corrected(iteration, equations, jacobian, float(size))
-            if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * tolerance):
+                return _Corrected(iteration, equations, row, float(size))
+            if not np.isfinite(size) or (size > (2.0 if patient else 0.5) * previous and size > 1e3 * tolerance):
                 return _Corrected(iteration)
             previous = size
             z = self.settled(z + change)
@@ -353,9 +357,10 @@ class NumberProblem(CurveProblem[NumberPoint]):
         known: dict[int, _Corrected] = {}
         number = float(z[-1])
 
-        def once(potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult:
+        def once(potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = False) -> NewtonResult:
             nonlocal number
-            found = self._on_set(cast("Family", potential), np.concatenate([x, [pressure, number]]), borders, closing, tolerance)
+            guess, on = np.concatenate([x, [pressure, number]]), cast("Family", potential)
+            found = self._on_set(on, guess, borders, closing, tolerance, patient=damped)
             last = found.last
             if last is None:
                 evaluation = potential.evaluate(x, pressure, number)
@@ -373,12 +378,13 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return replace(known[id(result.evaluation)], iterations=result.iterations)
 
     def _point(self, found: _Corrected, orientation: Array) -> NumberPoint:
-        equations, jacobian = cast("Equations", found.last), cast("WideBorder", found.jacobian)
+        equations, row = cast("Equations", found.last), cast("Array", found.row)
+        equations.let_go()
         evaluation, pressure = equations.evaluation, equations.pressure
         residual = relative_residual(equations.family, equations.force, evaluation, pressure)
         z = equations.carried(equations.z)
         state = State(z[:-2], pressure, evaluation, found.iterations, found.correction, residual, gap=0.0, _factor=equations.factor)
-        own = equations.whole(*jacobian.solve(None, [0.0, 1.0]))
+        own = equations.whole(*equations.jacobian(row).solve(None, [0.0, 1.0]))
         tangent = equations.carried(own)
         length = self.norm(tangent)
         if orientation @ tangent < 0:
@@ -390,11 +396,11 @@ class NumberProblem(CurveProblem[NumberPoint]):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Corrected:
-    """Where Newton's method ended: the last equations with their derivatives, None where it did not converge."""
+    """Where Newton's method ended: the last equations with the row of the last one, None where it did not converge."""
 
     iterations: int
     last: Equations | None = None
-    jacobian: WideBorder | None = None
+    row: Array | None = None
     correction: float = math.inf
 
 

@@ -8,6 +8,7 @@ load steps asked for.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 
@@ -84,6 +85,8 @@ def march(
         result = corrector(potential, control, x, pressure, magnetic=magnetic if parameter == "load" else there)
         spent += result.iterations
         reach = distance(potential, x, accepted[-1].x)
+        if potential.unsettled and parameter == "number":  # a body that comes on moves a membrane that nothing has moved before
+            reach = max(reach, abs(there - here) * cast("Family", potential).advance(accepted[-1].evaluation))
         if (
             result.status is Status.CONVERGED
             and distance(potential, result.x, x)
@@ -145,7 +148,7 @@ def _slope(potential: Potential, state: State, control: Control, parameter: str,
     _, row, corner = control.equation(space, evaluation.x, state.pressure, evaluation)
     bordered = evaluation.border(row, corner)
     if parameter == "load":
-        return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
+        return bordered.solve(np.zeros(len(state.x)), 1.0)  # N = (quantity - load)
     if parameter == "number" and isinstance(potential, Family):
         rate = control_rate(potential, control, evaluation.x, state.pressure, evaluation)
         force, shift = potential.number_rates(evaluation, state.pressure)

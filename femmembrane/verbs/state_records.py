@@ -12,7 +12,7 @@ from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
 from ..errors import InputError, SolveError, Status
 from ..potential import ContactFamily, Potential
-from ..results.analyses import asked
+from ..results.analyses import answer_at_once
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium, recorded
 from ..results.path_memory import PathMemory
@@ -103,8 +103,7 @@ def record(
     status = state.status if bad is None else bad.status
     own = state.evaluation
     equilibrium = recorded(scene, potential, own.x, state.pressure, own, status, state.residual, state.iterations, gas)
-    for analysis in asked(scene):
-        analysis.compute(equilibrium, previous, state.evaluation)
+    answer_at_once(equilibrium, previous, own)
     if clock is not None:  # written last, for answers take time
         store(equilibrium, seconds=time.perf_counter() - clock)
     return equilibrium
@@ -131,7 +130,7 @@ def record_on_borders(
     own = found.state.evaluation.potential
     moved = found.scene.bordered(own.scene.borders) if own.obstacles else found.scene
     new = record(moved, own, found.state, previous, clock, gas)
-    there = potential, state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    there = potential, state.evaluation.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
     store(new, on_branch=recorded(scene, *there))
     return new
 

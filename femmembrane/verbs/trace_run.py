@@ -344,7 +344,7 @@ class TraceRun(Run[Branch]):
             if (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
                 return end
             self._points = trace_points(self.problem, self.point, self.tracer)
-        before = replace(self.tracer)
+        before = None if self.along is None or self._again else replace(self.tracer, path=replace(self.tracer.path))
         with self.timed("solve"):
             new = next(self._points)
         segment = Segment(self.problem, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
@@ -352,7 +352,7 @@ class TraceRun(Run[Branch]):
         last = min(met, key=lambda p: p.sigma, default=None)
         unresolved = state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state))
         share = self._share(last or new, bool(unresolved))
-        if self.along is not None and share > 1 and not self._again:
+        if self.along is not None and before is not None and share > 1:
             return self._step_again(self.along, before, last or new, share)
         if unresolved:
             return Status.NOT_RESOLVED, f"at {self.place(last or new)} {unresolved}"

@@ -135,6 +135,16 @@ class Surface:
         return self.revolution.vectors(self.rho, self.eta)
 
     @property
+    def scalars(self) -> Array:
+        """Values at the points."""
+        return self.revolution.scalars(self.values)
+
+    @property
+    def circles(self) -> list[tuple[int, float]]:
+        """Nodes whose circles are drawn, with their thickness."""
+        return circles(self.rho, self.eta, [end % self.rho.size for end in self.equilibrium.potential.space.edges])
+
+    @property
     def normals(self) -> Array:
         """Normals of the deformed surface at the points, shape (n_points, 3)."""
         along = np.stack([np.gradient(self.rho), np.gradient(self.eta)])
@@ -249,7 +259,7 @@ class DrawnMembrane:
             first = np.concatenate([revolution.node[cells].min(axis=1) for cells in (revolution.triangles, revolution.quads)])
             self._mesh.cell_data["zone"] = surface.values[first]
         else:
-            self._mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
+            self._mesh.point_data[surface.quantity] = surface.scalars
 
     def _scale(self, surface: Surface) -> dict[str, Any]:
         if surface.quantity == "zone":
@@ -259,8 +269,7 @@ class DrawnMembrane:
     def _draw_circles(self, surface: Surface) -> None:
         import pyvista
 
-        ends = [end % surface.rho.size for end in surface.equilibrium.potential.space.edges]
-        shown = circles(surface.rho, surface.eta, ends)
+        shown = surface.circles
         points = _rings(np.array([(surface.rho[node], surface.eta[node], radius * self._size) for node, radius in shown]).reshape(-1, 3))
         if self._lines is not None and self._lines.n_points == len(points):
             self._lines.points = points
@@ -441,8 +450,8 @@ def polydata(revolution: Revolution, points: Array) -> pyvista.PolyData:
     return pyvista.PolyData(points, faces=np.concatenate(faces))
 
 
-def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18) -> None:
-    """Look from the front and a little from above, so that the points fill the picture beside the colour scale."""
+def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18, words: float = 0.0) -> None:
+    """Look from the front and a little from above, so that the points fill what words at the top and the colour scale leave."""
     toward = np.array([0.3, -1.0, 0.45])
     toward /= np.linalg.norm(toward)
     right = np.cross([0.0, 0.0, 1.0], toward)
@@ -451,9 +460,9 @@ def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: f
     x, y, depth = points @ right, points @ up, np.ptp(points @ toward) + 1.0
     aspect = plotter.window_size[0] / plotter.window_size[1]
     # height of the picture in units of the scene
-    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin)
+    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin - words)
     centre = (x.min() + x.max()) / 2 * right + (y.min() + y.max()) / 2 * up + (points @ toward).mean() * toward
-    centre = centre + bar / 2 * aspect * height * right
+    centre = centre + bar / 2 * aspect * height * right + words / 2 * height * up
     plotter.enable_parallel_projection()
     plotter.camera.focal_point, plotter.camera.up = tuple(centre), tuple(up)
     plotter.camera.position = tuple(centre + 10 * depth * toward)

@@ -5,6 +5,7 @@ References for the neo-Hookean disc under a frictionless plate: nine digits of a
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import femmembrane as fm
@@ -136,5 +137,27 @@ def test_the_last_value_is_that_of_the_last_scene():
     """A plate cannot go through the membrane at rest, though the one that is inflated away from it leaves room."""
     branch = fm.trace(plate(0.3, 8), over=HEIGHT, hold={"pressure": -1.0}, until={HEIGHT: -0.5}, max_steps=80)
     assert branch.status.name == "NO_EQUILIBRIUM"
-    assert 0 < branch[-1].number(HEIGHT) < 1e-6
+    assert abs(branch[-1].number(HEIGHT)) < 1e-6
     assert branch[-1].volume == pytest.approx(branch[0].volume, rel=1e-12)
+
+
+def test_a_ball_between_plates_is_compressed_at_the_centre_of_contact_alone():
+    """Half a ball of stretch 1.02 at a fixed volume. Flattening compresses its cap, which the plate holds flat; its border is in tension.
+
+    The least eigenvalue against waves around the axis changes smoothly there: a stress that vanishes brings none of its own.
+    """
+    stretch = 1.02
+    ball = scene(mesh=fm.cap(height=1.0, elements=12, rim="mirror"), degree=4, obstacles=[fm.Plane(1.01 * stretch)])
+    volume = 2 * np.pi / 3 * stretch**3
+    heights = np.array([1.005, 0.95, 0.85, 0.74, 0.71, 0.68, 0.607, 0.602, 0.5]) * stretch
+    branch = fm.vary(ball, over=HEIGHT, values=heights, hold={"volume": volume}, solver="newton")
+    assert len(branch) == len(heights)
+    assert branch[-1].scene.squeezed
+    pole = np.array([eq.profile([0.0])["mechanical_stress_2"][0] for eq in branch])
+    assert (pole[3:6] < -0.01).all()
+    assert (pole[[0, 1, 2, -1]] > 0.01).all()
+    for eq in branch[1:]:
+        assert eq.status is fm.Status.CONVERGED
+        assert eq.profile([eq.contact.reference_radius])["mechanical_stress_2"][0] > 0.05
+    values = [eq.verdict(azimuthal=4).smallest_eigenvalue for eq in branch]
+    assert (np.diff(values[1:]) > 0).all()

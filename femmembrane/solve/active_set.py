@@ -150,7 +150,8 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
     """The equilibrium with ends of elements at the borders of contact; None where there are none that ends could follow."""
     evaluation = cast("ContactEvaluation", result.evaluation)
     zones = [(zone, np.array(_estimates(root, evaluation, zone))) for zone in zones_of(root, evaluation.held)]
-    zones = [(zone, places) for zone, places in zones if places.size and _smooth_about(root, evaluation, zone)]
+    zones = [(zone, places) for zone, places in zones if places.size and not _ends_at_seam(root, evaluation.held, zone)]
+    zones = [(zone, places) for zone, places in zones if _smooth_about(root, evaluation, zone)]
     followed = [(zone, places) for zone, places in zones if _assigned(root, [zone], places) is not None]
     if not followed or _assigned(root, [z for z, _ in followed], np.concatenate([s for _, s in followed])) is None:
         return None
@@ -203,6 +204,12 @@ def _sides(root: ContactPotential, zone: tuple[int, int]) -> list[bool]:
     """The borders of a zone: False for that at its beginning, True for that at its end; an end of the meridian is none."""
     known = set(root.nodes.tolist())
     return [side for side, beyond in ((False, zone[0] - 1), (True, zone[1] + 1)) if beyond in known]
+
+
+def _ends_at_seam(root: ContactPotential, held: Mask, zone: tuple[int, int]) -> bool:
+    """Whether contact ends at the seam of a closed meridian, where no end of an element follows it."""
+    first, last = int(root.nodes[0]), int(root.nodes[-1])
+    return root.space.closed and ((zone[0] == first and not held[-1]) or (zone[1] == last and not held[0]))
 
 
 def _smooth_about(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> bool:

@@ -1,16 +1,17 @@
 """In which cones the limit point of an inflated disc is lost, and whether a pre-stretch brings it back.
 
-A disc is clamped at the base of a rigid cone and inflated into it. Its meridian is convex, so that it comes to the wall at the rim first: when
-its tangent there has turned to the wall. Up to then it is the free disc. So the free limit point is that of the disc in the cone as long as
-the rim at the limit point leans more to the axis than the wall. One angle for each pre-stretch says this, and a fold curve over the
-pre-stretch of the free disc gives it (angles from the axis, positive for cones that narrow). In narrower cones the wall comes first. It puts
-the limit point off to a higher pressure, and in still narrower ones it is lost. Widening cones only put it off.
+A disc is clamped at the base of a rigid cone and inflated into it. Its meridian is convex, so that it comes to the wall at the rim first:
+when its tangent there has turned to the wall. Up to then it is the free disc. So the free limit point is that of the disc in the cone as
+long as the rim at the limit point leans more to the axis than the wall. One angle for each pre-stretch says this, and a fold curve over
+the pre-stretch of the free disc gives it (angles from the axis, positive for cones that narrow). In narrower cones the wall comes first.
+It puts the limit point off to a higher pressure, and in still narrower ones it is lost. Widening cones only put it off.
 
-A limit point that a cone has taken away does come back with pre-stretch, in materials that stiffen less than as the square of the stretch:
-Ogden's material of one term with a < 2. With a = 1.8 in a cone of 3 or of 7 degrees there is none without pre-stretch, and at 3 there is one.
-With a neo-Hookean disc (a = 2) none comes back in any cone that narrows. At a large pre-stretch its tension is that of the square of the
-stretch alone, for which rho and eta obey linear equations. Their solution at the limit point is half a sphere, P = 2/p and V = 2 pi/3 p^3, with
-an upright rim. With less pre-stretch the disc bulges farther. The angle is never positive, and that of Mooney-Rivlin and Gent is lower still.
+A limit point that a cone has taken away does come back with pre-stretch, in materials that stiffen less than as the square of the
+stretch: Ogden's material of one term with a < 2. With a = 1.8 in a cone of 3 or of 7 degrees there is none without pre-stretch, and at 3
+there is one. With a neo-Hookean disc (a = 2) none comes back in any cone that narrows. At a large pre-stretch its tension is that of the
+square of the stretch alone, for which rho and eta obey linear equations. Their solution at the limit point is half a sphere, P = 2/p and
+V = 2 pi/3 p^3, with an upright rim. With less pre-stretch the disc bulges farther. The angle is never positive, and that of Mooney-Rivlin
+and Gent is lower still.
 
     python demos/cone_limit.py             table and picture in out/cone_limit, 15 seconds
 """

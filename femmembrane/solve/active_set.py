@@ -53,6 +53,10 @@ _SAME_CURVATURE = 1e-6
 _PULL, _INSIDE = 1e-3, 1e-6
 
 
+#: share of a segment on either side of a corner at which its smooth parts end
+_BESIDE = 1e-6
+
+
 class Once(Protocol):
     """A corrector on a smooth potential; ``damped`` for a guess that is not next to a solution."""
 
@@ -477,6 +481,29 @@ def contact_events(segment: Segment[Any]) -> list[Located[Any]]:
         before, after = pressed(segment.a), pressed(segment.b)
         if before * after < 0 or (after == 0 and before != 0):
             found.append(segment.root("touch" if after > before else "release", pressed, 0.0, 1.0))
+    return found
+
+
+def folds_beside(segment: Segment[Any], kind: str, events: list[Located[Any]]) -> list[Located[Any]]:
+    """The folds of a kind on a segment whose branch has corners: those of its smooth parts, and a corner on whose sides a rate has other
+    signs.
+
+    A cubic through both ends knows nothing of a fold just before a corner, beyond which the quantity turns again.
+    """
+    if not events:
+        return segment.folds(kind)
+    shares = sorted({(event.point.sigma - segment.a.sigma) / segment.length for event in events})
+    ends = [0.0, *(share + side * _BESIDE for share in shares for side in (-1, 1)), 1.0]
+    if not all(low < high for low, high in pairwise(ends)):
+        return segment.folds(kind)
+    points = [segment.at(share) for share in ends]
+    found: list[Located[Any]] = []
+    for low, high in zip(points[::2], points[1::2], strict=True):
+        found += type(segment)(segment.problem, low, high).folds(kind)
+    quantity = segment.problem.folds[kind]
+    for before, after, event in zip(points[1::2], points[2::2], sorted(events, key=lambda e: e.point.sigma), strict=False):
+        if before.rate(quantity) * after.rate(quantity) < 0:
+            found.append(type(event)(kind, event.point, event.error))
     return found
 
 

@@ -23,7 +23,7 @@ from ..results.special_point import SpecialPoint
 from ..scene import ALL, Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
-from ..solve.active_set import contact_events
+from ..solve.active_set import contact_events, folds_beside
 from ..solve.bare import usual_volume
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
@@ -487,9 +487,10 @@ class TraceRun(Run[Branch]):
         if self.special is None:
             return None
         with self.timed("special_points"):
-            located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
+            events = contact_events(segment)
+            located = [fold for kind in self.problem.folds for fold in folds_beside(segment, kind, events)]
             crossed = self.crossed(segment)
-            located += [*crossed, *contact_events(segment), *self._zone_events(segment)]
+            located += [*crossed, *events, *self._zone_events(segment)]
             for fold in sorted(located, key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))

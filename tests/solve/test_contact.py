@@ -295,6 +295,18 @@ def test_obstacle_at_the_height_of_the_limit_point():
     assert branch.status is fm.Status.CONVERGED
 
 
+def test_a_limit_point_and_a_touch_within_one_step():
+    """The plate just above the pole at the limit point: the pressure falls from there to the touch, where it turns in a corner."""
+    bare = fm.trace(fm.Scene(material=NH, mesh=fm.disc(16)), start=1.0, until={"volume": 4.0})
+    fold = next(p for p in bare.special_points if p.kind == "limit_point")
+    branch = fm.trace(plate(fold.center_height + 2e-3, elements=16), start=2.0, until={"volume": 4.0})
+    assert [p.kind for p in branch.special_points] == ["limit_point", "limit_point", "touch"]
+    first, second, touch = branch.special_points
+    assert first.pressure == pytest.approx(fold.pressure, rel=1e-12)
+    assert second.volume == pytest.approx(touch.volume, rel=1e-9)
+    assert fold.volume < second.volume < fold.volume + 0.02
+
+
 def test_a_plate_next_to_a_membrane_at_rest():
     """At 1e-12 the law of a nearly flat disc holds until it touches: P = 3.3367 V^3, and w(0) is in proportion to V."""
     near = plate(1e-12, elements=16)

@@ -114,6 +114,7 @@ def sweep(
                 return fail(NOT_WRITTEN, f"{not_written(error, out)}. {done[0]} of {done[1]} scenes were done")
             raise
         except KeyboardInterrupt:
+            interrupts.over = True
             return fail(INTERRUPTED, f"interrupted. {done[0]} of {done[1]} scenes are kept in {out}: the same command goes on from there")
         interrupts.hold = True
         results = found.failed < len(found)

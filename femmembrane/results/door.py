@@ -268,6 +268,13 @@ def branch_html(branch: Branch) -> str:
     return branch_html(branch)
 
 
+def tipped_html(branch: TippedBranch) -> str:
+    """See :func:`femmembrane.views.notebook.tipped_html`."""
+    from ..views.notebook import tipped_html
+
+    return tipped_html(branch)
+
+
 def equilibrium_html(equilibrium: Equilibrium) -> str:
     """See :func:`femmembrane.views.notebook.equilibrium_html`."""
     from ..views.notebook import equilibrium_html
@@ -303,7 +310,7 @@ def error_estimate_html(estimate: ErrorEstimate) -> str:
     return error_estimate_html(estimate)
 
 
-def study_html(study: Convergence | Cost | Sweep, label: str) -> str:
+def study_html(study: Convergence | Cost | Sweep | Fit, label: str) -> str:
     """See :func:`femmembrane.views.notebook.study_html`."""
     from ..views.notebook import study_html
 

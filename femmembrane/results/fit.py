@@ -195,6 +195,10 @@ class Fit:
     evaluations: int = field(repr=False)
     samples: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
+    def _repr_html_(self) -> str:
+        """Data and fitted curve above the numbers, for notebooks."""
+        return door.study_html(self, "Measured and fitted")
+
     @property
     def summary(self) -> str:
         """The numbers with their standard errors, and whether they are determined, in a line."""

@@ -67,6 +67,18 @@ def remarks_on_loads(scene: Scene) -> tuple[str, ...]:
     return ()
 
 
+def remarks_on_direction(scene: Scene) -> tuple[str, ...]:
+    """A remark on a branch that sets out away from the only volume at which it is to end: it arrives there if it turns back, or never."""
+    run = scene.run
+    if run is None or run.control != "arc-length" or run.over or run.start is None or set(run.until or {}) != {"volume"}:
+        return ()
+    end, way = (run.until or {})["volume"], run.direction or 1
+    if (end - run.start) * way >= 0:
+        return ()
+    begun = f"it sets out from V = {run.start:g}, away from run.until.volume = {end:g}"
+    return (f"run.direction = {way}: {begun}; {-way} sets out the other way",)
+
+
 def _loads(run: Run) -> Iterator[tuple[str, str, float]]:
     """Key, quantity and value of the loads at the ends of a run."""
     quantity = run.quantity or ("volume" if run.control == "arc-length" else "")

@@ -23,6 +23,8 @@ from .wellposed import ill_posed, is_slack, slackness, unresolved_source
 
 #: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
 HUGE = 1e12
+#: what can be held while the membrane goes downhill
+DOWNHILL = (CONTROLS["volume"], CONTROLS["pressure"])
 #: most corrections of a guess
 CORRECTIONS = 40
 #: most steps along a branch in each direction

@@ -32,9 +32,9 @@ from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
+from ..solve.end_strains import strains_at_ends
 from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
-from .end_strains import strains_at_ends
 from .profile import profile_at
 
 Array = NDArray[np.float64]

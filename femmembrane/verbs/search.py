@@ -44,7 +44,8 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
     control, load = only("equilibria", {"pressure": pressure, "volume": volume}, "exactly one of pressure and volume is allowed")
     load = number(control, load)
     check_max_steps(max_steps)
-    potential = potential_of(scene)
+    # many states are looked at, of which few are kept
+    potential = potential_of(scene.replace(follow_borders=None) if scene.follows_zones else scene)
     search = Search(potential, control, load, max_steps)
     search.run()
     found = [record_on_borders(scene, state, holding(CONTROLS[control].at(load))) for state in search.states]

@@ -13,6 +13,7 @@ import numpy as np
 from ..accuracy.adapt import Along
 from ..accuracy.borders import Solve, holding
 from ..checks import choice, is_number, number, sign, store
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.branch import Branch
@@ -28,12 +29,13 @@ from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS, check_height
-from ..solve.finer_space import met_across, transferred
+from ..solve.finer_space import met_across
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
 from ..solve.start import start_at_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
+from ..solve.zone_events import ZoneEvent, zone_events
 from ..stability.azimuthal import azimuthal_eigenvalue
 from .arguments import check_ill_posed, check_max_steps
 from .changed_mesh import carried_path, carried_point, goes_alike, state_there
@@ -344,7 +346,7 @@ class TraceRun(Run[Branch]):
             if (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
                 return end
             self._points = trace_points(self.problem, self.point, self.tracer)
-        before = replace(self.tracer)
+        before = None if self.along is None or self._again else replace(self.tracer, path=replace(self.tracer.path))
         with self.timed("solve"):
             new = next(self._points)
         segment = Segment(self.problem, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
@@ -352,7 +354,7 @@ class TraceRun(Run[Branch]):
         last = min(met, key=lambda p: p.sigma, default=None)
         unresolved = state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state))
         share = self._share(last or new, bool(unresolved))
-        if self.along is not None and share > 1 and not self._again:
+        if self.along is not None and before is not None and share > 1:
             return self._step_again(self.along, before, last or new, share)
         if unresolved:
             return Status.NOT_RESOLVED, f"at {self.place(last or new)} {unresolved}"
@@ -488,10 +490,15 @@ class TraceRun(Run[Branch]):
             events = contact_events(segment)
             located = [fold for kind in self.problem.folds for fold in folds_beside(segment, kind, events)]
             crossed = self.crossed(segment)
-            for fold in sorted(located + crossed + events, key=lambda f: f.point.sigma):
+            located += [*crossed, *events, *self._zone_events(segment)]
+            for fold in sorted(located, key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
             return self.closing(segment, crossed, last)
+
+    def _zone_events(self, segment: Segment[BranchPoint]) -> list[ZoneEvent]:
+        """Where zones of a tension field open or close."""
+        return zone_events(segment, self.own) if self.scene.tension_field else []
 
     def closing(self, segment: Segment[Any], crossed: Sequence[Located[Any]], last: BranchPoint | None) -> BranchPoint | None:
         """The point at which the branch comes back to where it set out, if it does so before the end of the trace."""
@@ -532,7 +539,7 @@ class TraceRun(Run[Branch]):
     def _onset(self, segment: Segment[BranchPoint], n: int, low: float, top: float, guess: Array | None = None) -> SpecialPoint:
         def eigenvalue(point: BranchPoint) -> float:
             potential, own = self.potential_at(point), point.state.evaluation
-            if potential.obstacles:
+            if potential.follows:
                 potential = own.potential
             return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
 

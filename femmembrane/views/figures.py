@@ -227,6 +227,20 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
     return figure
 
 
+#: colours of several curves or branches in one picture: for the colour-blind too, and of different lightness
+COLORS = ("#0072b2", "#d55e00", "#222222", "#56b4e9", "#a01040", "#e69f00", "#009e73")
+#: dashes that go with them, so many that no two curves of 28 look the same
+DASHES: tuple[Any, ...] = ("solid", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)))
+
+
+def tell_apart(axes: Axes) -> None:
+    """Let the curves that are drawn next differ in colour, in lightness and in dashes, so that they do in grey as well."""
+    from cycler import cycler
+
+    looks = [(COLORS[k % len(COLORS)], DASHES[k % len(DASHES)]) for k in range(len(COLORS) * len(DASHES))]
+    axes.set_prop_cycle(cycler(color=[color for color, _ in looks], linestyle=[dashes for _, dashes in looks]))
+
+
 def save_axes(axes: Axes, path: str | PathLike[str] | None) -> Axes:
     """Fit and write the figure of axes that somebody gave, as :func:`save_figure`, and return the axes."""
     whole = axes.get_figure(root=True)
@@ -259,6 +273,10 @@ def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
     legend = draw()
     if figure is None or not hasattr(figure, _HEIGHTS) or "loc" in look or not covers(legend, axes):
         return  # in figures of others there may be no room below
+    for corner in _CORNERS:  # Matplotlib's own choice looks at corners of lines, and not as far from them
+        legend.set_loc(corner)
+        if not _over(legend, axes):
+            return
     legend.remove()
     low = axes.get_window_extent().y0 - axes.xaxis.get_tightbbox().y0  # type: ignore[union-attr]  # the axes are shown
     place = axes.transAxes + ScaledTranslation(0.0, -low / figure.dpi - 0.05, figure.dpi_scale_trans)
@@ -270,10 +288,18 @@ def covers(legend: Any, axes: Axes) -> bool:
     """Whether a legend lies over a line, a marker or words in its axes."""
     figure = legend.get_figure(root=True)
     figure.draw_without_rendering()
+    return _over(legend, axes)
+
+
+def _over(legend: Any, axes: Axes) -> bool:
+    """The same, in a figure that is laid out."""
+    figure = legend.get_figure(root=True)
     box = legend.get_window_extent().padded(_CLEAR * figure.dpi / 72)
     return covered(axes, box) > 0 or any(box.overlaps(text.get_window_extent()) for text in axes.texts if text.get_text())
 
 
+#: where a legend may stand in its axes
+_CORNERS = ("upper right", "upper left", "lower right", "lower left", "center right", "center left")
 #: height in inches that a figure of this package had before a legend stood below its axes, and the heights of these legends
 _HEIGHTS = "_femmembrane_heights"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
@@ -18,7 +19,9 @@ from ..results.curve import slopes_of
 from ..results.tipped import TippedBranch, TippedEquilibrium, TippedPoint
 from ..solve.between import cubic
 from .branch_lines import MARKERS
+from .picture import Surface, polydata
 from .plots import new_figure, save_figure
+from .surroundings import Box
 from .vtk import Revolution, write_collection
 from .zones import new_label
 
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: what the colour of a state with waves shows
+COLOR = "wave_size"
 _LINE, _GREY = "#d55e00", "#777777"
 #: words and look of a line by its verdict at a held volume: stable, not stable, not asked for
 _LOOKS: dict[bool | None, tuple[str, dict[str, Any]]] = {
@@ -34,6 +39,11 @@ _LOOKS: dict[bool | None, tuple[str, dict[str, Any]]] = {
     False: ("unstable at a held volume or not known", {"color": _LINE, "linewidth": 1.0, "linestyle": "--"}),
     None: ("stability not tested", {"color": _GREY, "linewidth": 1.4}),
 }
+#: columns that are drawn along cubics, and those of them that change their sign with the direction in which the membrane leans
+_SMOOTH = (*PLACES, "amplitude", "shift", "energy", "elastic_energy", "magnetic_energy", "load_energy", "electric_energy")
+_ODD = ("amplitude", "shift")
+#: corners of the line between two points of the branch
+_CORNERS = 24
 
 
 def surface_at(equilibrium: TippedEquilibrium, angles: Array) -> dict[str, Array]:
@@ -57,8 +67,7 @@ def _write_surface(equilibrium: TippedEquilibrium, file: Path, sectors: int = 96
     R, Z = space.mesh.position(space.node_parameters())
     revolution = Revolution.of(R, sectors, space.closed, space.side)
     found = equilibrium.surface(sectors)
-    column = np.mod(np.rint(np.arctan2(revolution.sine, revolution.cosine) / (2 * np.pi) * sectors).astype(int), sectors)
-    points = np.stack([found[name][revolution.node, column] for name in ("x", "y", "z")], axis=1)
+    points = np.stack([found[name][revolution.node, _columns(revolution, sectors)] for name in ("x", "y", "z")], axis=1)
     cells = [(kind, c) for kind, c in (("triangle", revolution.triangles), ("quad", revolution.quads)) if len(c)]
     loads = {"pressure": equilibrium.pressure, "volume": equilibrium.volume}
     data = {"displacement": points - revolution.vectors(R, Z)}
@@ -67,11 +76,63 @@ def _write_surface(equilibrium: TippedEquilibrium, file: Path, sectors: int = 96
         mesh.write(temporary, file_format="vtu")
 
 
-#: columns that are drawn along cubics, and those of them that change their sign with the direction in which the membrane leans
-_SMOOTH = (*PLACES, "amplitude", "shift", "energy", "elastic_energy", "magnetic_energy", "load_energy", "electric_energy")
-_ODD = ("amplitude", "shift")
-#: corners of the line between two points of the branch
-_CORNERS = 24
+@dataclass(frozen=True, eq=False)
+class WavySurface(Surface):
+    """A state with waves around the axis as a surface; its colour shows how far they move each point.
+
+    Attributes
+    ----------
+    places : ndarray, shape (n_points, 3)
+    """
+
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @classmethod
+    def of_tipped(cls, equilibrium: TippedEquilibrium, sectors: int) -> WavySurface:
+        """The surface at the nodes of the meridian and so many angles."""
+        space = equilibrium.potential.space
+        R, _ = space.mesh.position(space.node_parameters())
+        found, revolution = equilibrium.surface(sectors), Revolution.of(R, sectors, space.closed, space.side)
+        moved = equilibrium.tipped.shape(equilibrium.state, 2 * np.pi * np.arange(sectors) / sectors)[0]
+        waves = np.sqrt(((moved - moved.mean(axis=2, keepdims=True)) ** 2).sum(axis=0))
+        at = revolution.node, _columns(revolution, sectors)
+        places = np.stack([found[name][at] for name in ("x", "y", "z")], axis=1)
+        rho = np.hypot(found["x"], found["y"]).max(axis=1)
+        return cls(equilibrium, COLOR, rho, found["z"].mean(axis=1), revolution, waves[at], places)  # type: ignore[arg-type]
+
+    @property
+    def points(self) -> Array:
+        return self.places
+
+    @property
+    def scalars(self) -> Array:
+        return self.values
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """From 0 to the largest value, apart by as much as is worth a colour."""
+        return 0.0, max(float(self.values.max()), 1e-6 * float(self.rho.max()))
+
+    @property
+    def circles(self) -> list[tuple[int, float]]:
+        """Only where the membrane is held on circles: others are none."""
+        return []
+
+    @property
+    def normals(self) -> Array:
+        mesh = polydata(self.revolution, self.places)
+        found = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False)
+        return np.asarray(found.point_data["Normals"], dtype=np.float64)
+
+    @property
+    def box(self) -> Box:
+        return Box(float(self.rho.max()), float(self.places[:, 2].min()), float(self.places[:, 2].max()))
+
+
+def _columns(revolution: Revolution, sectors: int) -> NDArray[np.int64]:
+    """Number of the angle of each point."""
+    turns = np.rint(np.arctan2(revolution.sine, revolution.cosine) / (2 * np.pi) * sectors)
+    return np.mod(turns.astype(np.int64), sectors)
 
 
 def plot_tipped(branch: TippedBranch, path: str | PathLike[str] | None, ax: Axes | None, x: str, y: str, label: str) -> Any:

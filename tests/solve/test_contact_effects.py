@@ -18,7 +18,7 @@ from femmembrane.solve.controls import PressureControl, VolumeControl
 from femmembrane.solve.minimize import minimize
 
 from ..contact_scenes import asking, contact_scene
-from ..contact_shooting import WrinkledPlate, wrinkled_under_plate
+from ..contact_shooting import WrinkledPlate, tube_on_a_rod, wrinkled_under_plate
 from .test_contact import AT_05, BODIES, NH, once, plate
 
 
@@ -53,13 +53,31 @@ def test_contact_and_wrinkles_together():
 
 @pytest.mark.parametrize(("degree", "elements", "within"), [(2, 16, 5e-6), (2, 32, 5e-7), (4, 12, 2e-10)])
 def test_elements_that_follow_both_borders_keep_the_order(degree, elements, within):
-    scene = sliding(elements, degree, follow_zones=True)
+    scene = sliding(elements, degree, follow_borders=True)
     eq = fm.equilibrium(scene, volume=known().volume)
     assert eq.pressure == pytest.approx(known().pressure, abs=within)
     assert eq.contact.radius == pytest.approx(0.2, abs=4 * within)
     assert eq.contact.reference_radius == pytest.approx(known().reference_radius, abs=4 * within)
     assert eq.zones("mechanical").borders[0] == pytest.approx(known().wrinkled_from, abs=4 * within)
     assert eq.contact.zones[0].followed
+
+
+@pytest.mark.parametrize(("degree", "elements", "follow", "within"), [(2, 24, None, 2e-4), (2, 24, True, 4e-6), (4, 16, True, 1e-10)])
+def test_a_wrinkled_tube_lies_on_a_rod(degree, elements, follow, within):
+    """Contact within the wrinkles: there the pressure of contact is -P, and the mean of the wrinkles is on the rod."""
+    known = tube_on_a_rod(0.7, -0.5, (1.6, 0.3))
+    rod = fm.Cylinder(height=0.0, radius=0.7, length=1.6, rounding=0.3)
+    scene = fm.Scene(material=NH, mesh=fm.cylinder(length=2.0, elements=elements), degree=degree, prestretch=1.5, obstacles=[rod])
+    eq = fm.equilibrium(scene.replace(tension_field=True, follow_borders=follow), pressure=-0.5)
+    assert eq.volume == pytest.approx(known.volume, abs=within)
+    (zone,) = eq.contact.zones
+    assert zone.followed
+    assert (zone.start, zone.stop) == pytest.approx((1 - known.contact, 1 + known.contact), abs=within)
+    assert zone.normal_force == pytest.approx(0.5 * 2 * np.pi * 0.7 * 2 * known.contact * known.stretch, rel=3 * within)
+    assert eq.contact.pressure([1.0]) == pytest.approx(0.5, rel=1e-2 if degree == 2 else 1e-8)
+    zones = eq.zones("mechanical")
+    assert zones.kinds == ("taut", "radial", "taut")
+    assert zones.zones[1].s == pytest.approx((1 - known.wrinkled, 1 + known.wrinkled), abs=4 * within if follow else 1e-2)
 
 
 def test_minimiser_and_corrector_agree_on_a_tension_field():
@@ -154,6 +172,40 @@ def test_bending_in_verdicts_beside_a_body(name):
     np.testing.assert_allclose(thin, bare, rtol=5e-3)
 
 
+@pytest.mark.parametrize("name", [pytest.param("plane", marks=pytest.mark.slow), "ball"])
+def test_a_border_of_contact_holds_the_slope_of_a_thin_sheet(name):
+    """With bending a slope falls to that of the body over the length d = sqrt(D/N) of a boundary layer, as at an end that is held. To first
+    order in d, which is T/R0 times a number, each adds 2 pi rho N phi^2 d to an eigenvalue, where phi is the turn of the mode, at a border
+    of contact less that of the membrane on the body. Here d^2 = l1 W_11 l3^2/(12 W_1) (T/R0)^2.
+    """
+    a = {"plane": 0.358, "ball": 0.139}[name]  # about where contact ends
+    radii = [0, a / 2, *np.linspace(a - 0.03, a + 0.09, 13), *np.linspace(a + 0.15, 0.88, 6), *np.linspace(0.9, 1.0, 11)]
+    scene = fm.Scene(material=NH, mesh=fm.disc(radii=radii), degree=4, obstacles=[BODIES[name]])
+    bare = fm.equilibrium(scene, volume=1.2)
+    found = bare.verdict("pressure")
+    space = bare.potential.space
+
+    def turn(s):
+        (_, u_s, _, w_s), (_, a_s, _, b_s) = space.displacement(bare.state, s), space.evaluate(found.coefficients, s)
+        return ((1 + u_s) * b_s - w_s * a_s) / ((1 + u_s) ** 2 + w_s**2)
+
+    def of_layer(outside, inside):
+        s = np.array([outside])
+        u, u_s, _, w_s = space.displacement(bare.state, s)
+        l1, l2 = np.hypot(1 + u_s, w_s), 1 + u / s
+        w_1, w_11, l3 = l1 - 1 / (l1**3 * l2**2), 1 + 3 / (l1**4 * l2**2), 1 / (l1 * l2)
+        phi = turn(s) - (0.0 if inside is None else turn(np.array([inside])))
+        return float((2 * np.pi * s * w_1 * phi**2 * np.sqrt(l1 * w_11 * l3**2 / (12 * w_1)))[0])
+
+    border = bare.contact.zones[0].stop
+    expected = of_layer(border + 1e-9, border - 1e-9) + of_layer(1 - 1e-9, None)
+    slopes = []
+    for ratio in (50.0, 100.0):
+        eq = fm.equilibrium(scene.replace(bending=True, radius_to_thickness=ratio), volume=1.2)
+        slopes.append(ratio * (eq.verdict("pressure").smallest_eigenvalue - found.smallest_eigenvalue))
+    assert 2 * slopes[1] - slopes[0] == pytest.approx(expected, rel=5e-3)
+
+
 def test_the_worst_waves_of_a_compressed_membrane_beside_a_ball():
     scene = fm.Scene(material=NH, mesh=fm.disc(24), obstacles=[BODIES["ball"]], bending=True, radius_to_thickness=50.0)
     eq = fm.equilibrium(scene, volume=1.2)
@@ -191,7 +243,7 @@ def _carried(eq: fm.Equilibrium, scene: fm.Scene) -> np.ndarray:
 
 
 def test_files_keep_both_borders(tmp_path):
-    scene = sliding(12, 3, follow_zones=True)
+    scene = sliding(12, 3, follow_borders=True)
     branch = fm.inflate(scene, volumes=[0.7, known().volume])
     assert branch[-1].on_branch.contact.radius == pytest.approx(0.2, abs=1e-3)
     branch.save(tmp_path / "branch.nc")

@@ -32,7 +32,6 @@ def at_touch() -> tuple[float, float]:
 
 @FAMILY.case("10 elements", "two of them in contact", Number(AT_03[0], abs=2e-4), 10)
 @FAMILY.case("100 elements", "the border inside an element", Number(AT_03[0], abs=5e-8), 100)
-@FAMILY.case("10,000 elements", "sets of 20,000 nodes", Number(AT_03[0], abs=5e-9), 10_000, slow=True)
 def elements(count: int) -> float:
     return settled(fm.equilibrium(plate(elements=count), volume=AT_03[1])).pressure
 

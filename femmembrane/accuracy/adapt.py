@@ -45,7 +45,7 @@ Follow = Callable[[Scene], "Branch"]
 #: number of these equilibria, the hardest ones, that are tried on every mesh
 TRIED = 4
 #: elements of the trial meshes, tried in turn until errors can be estimated
-_TRIAL_MESHES, _TRIAL_DEGREE = (12, 24, 48), 6
+TRIAL_MESHES, _TRIAL_DEGREE = (12, 24, 48), 6
 #: relative error above which a trial mesh says too little about the states
 _BLIND = 1e-2
 #: degree of the elements whose misses grade the mesh
@@ -258,8 +258,8 @@ def _followed(potential: Potential, scene: Scene, state: State, held: Control) -
 def trial_of(scene: Scene, follow: Follow, control: str) -> Trial:
     """The run on the coarsest trial mesh on which its errors can be estimated."""
     controls, trial, asked = controls_of(control), None, by_quantity(accuracy_of(scene))
-    for elements in _TRIAL_MESHES:
-        branch = follow(on_trial_mesh(scene, _trial_mesh(scene.mesh, elements)))
+    for elements in TRIAL_MESHES:
+        branch = follow(on_trial_mesh(scene, trial_mesh(scene.mesh, elements)))
         if not len(branch):
             failure = SolveError(branch.message, status=branch.status)
             continue
@@ -292,7 +292,7 @@ def estimated_trial(
     return Trial(equilibria[0].of_branch.potential.space, states, controls, errors[known], elements, wrinkled, yardstick)
 
 
-def _trial_mesh(mesh: Meridian, elements: int) -> Meridian:
+def trial_mesh(mesh: Meridian, elements: int) -> Meridian:
     """A shape on about so many elements, all alike but for the cells of a file."""
     first, last = (float(s) for s in mesh.breakpoints()[[0, -1]])
     corners = mesh.corners() if isinstance(mesh, Curve) else ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, cast
 
@@ -16,7 +16,7 @@ from ..scene import Scene
 from ..solve.state import State
 from ..solve.state_resolution import largest_kink
 from ..solve.wellposed import ill_posed, stress_scale
-from .adapt import FEWEST_ALONG, SHARE, TRIED, Choice, Follow, Trial, estimated_trial, on_trial_mesh, trial_of
+from .adapt import FEWEST_ALONG, SHARE, TRIAL_MESHES, TRIED, Choice, Follow, Trial, estimated_trial, on_trial_mesh, trial_mesh, trial_of
 from .yardstick import Yardstick, accuracy_of, controls_of, error_across, least_pressure, relative_error, spread, yardstick_of
 
 if TYPE_CHECKING:
@@ -190,6 +190,43 @@ def choose_and_check(
     if changes and branch.message and not every:
         return branch.scene, None, Along(controls, first.yardstick)
     return branch.scene, shortfall, None
+
+
+def trial_scenes(scene: Scene) -> Iterator[Scene]:
+    """The scene on trial meshes, from coarse to fine."""
+    for elements in TRIAL_MESHES:
+        yield on_trial_mesh(scene, trial_mesh(scene.mesh, elements))
+
+
+def meshes_for(scene: Scene, states: Sequence[Equilibrium]) -> list[Scene]:
+    """The scene on a mesh for each of some states at a load: on one for all if one of moderate size keeps the accuracy.
+
+    A state without an estimate has the mesh of the others; if none has one, it stays where it is.
+
+    Raises
+    ------
+    SolveError
+        With status ACCURACY_NOT_MET when no mesh is good enough.
+    """
+    if not states:
+        return []
+    controls = controls_of("arc-length")
+    elements = states[0].scene.mesh.elements
+    trial = estimated_trial(states, controls, elements, by_quantity(accuracy_of(scene)))
+    if not len(trial.errors):
+        return [eq.of_branch.scene for eq in states]
+    many = len(trial.states) > 1 and not (trial.wrinkled or scene.follows_zones)
+    try:
+        return [Choice(scene, trial, accuracy_of(scene), most=_MOST_OF_ONE if many else None).chosen()] * len(states)
+    except SolveError:
+        if not many:
+            raise
+    chosen = {}
+    for eq, error in zip(trial.states, trial.errors, strict=True):
+        own = replace(trial, states=[eq], errors=np.array([error]))
+        chosen[id(eq)] = Choice(scene, own, accuracy_of(scene), most=_MOST_ALONG).chosen()
+    largest = max(chosen.values(), key=lambda found: found.mesh.elements)
+    return [chosen.get(id(eq), largest) for eq in states]
 
 
 def _first_of_many(scene: Scene, trial: Trial) -> Scene:

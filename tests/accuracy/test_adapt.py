@@ -115,6 +115,63 @@ def test_trace_finds_the_limit_points():
     assert [p.pressure for p in found] == pytest.approx([p["pressure"] for p in expected], rel=1e-6)
 
 
+def test_all_equilibria_at_a_load():
+    """On one mesh where it is small; P at the volumes found, against 64 elements of degree 6."""
+    found = fm.equilibria(asking(ABOVE, 1e-7), pressure=1.8)
+    assert len(found) == 4
+    assert {eq.scene.mesh.accuracy for eq in found} == {1e-7}
+    assert len({eq.scene.mesh for eq in found}) == 1
+    assert unknowns(found[0].scene) < 60
+    for eq in found:
+        assert eq.pressure == pytest.approx(1.8, rel=1e-12)
+        fine = fm.equilibrium(ABOVE.replace(degree=6), volume=eq.volume, start=on(ABOVE.replace(degree=6), eq), solver="newton")
+        assert fine.pressure == pytest.approx(1.8, rel=1e-7)
+
+
+def on(scene: fm.Scene, eq: fm.Equilibrium) -> fm.Equilibrium:
+    from femmembrane.results.other_mesh import found_on, state_of
+
+    return found_on(scene, eq.potential, state_of(eq))
+
+
+def test_all_equilibria_on_meshes_of_their_own(monkeypatch):
+    """Where one mesh for all would be large, each has its own."""
+    monkeypatch.setattr(along, "_MOST_OF_ONE", 3)
+    found = fm.equilibria(asking(ABOVE, 1e-7), pressure=1.8)
+    assert len({eq.scene.mesh for eq in found}) > 1
+    assert max(eq.error_estimate().pressure.relative for eq in found) < 1e-7
+
+
+def test_a_fold_over_a_number():
+    """The limit point over the susceptibility, from a point of whatever mesh; against 64 elements of degree 6."""
+    scene = disc_scene(OGDEN, (1.0, 6.5))
+    asked = {"parameter": "membrane.susceptibility", "bounds": (1.0, 3.0)}
+    curves = []
+    for mesh, degree in ((fm.disc(accuracy=1e-7), None), (fm.disc(64), 6)):
+        traced = scene.replace(mesh=fm.disc(8)) if degree is None else scene.replace(mesh=mesh, degree=degree)
+        point = fm.trace(traced, start=1.0, until={"volume": 5.0}).special_points[0]
+        curves.append(fm.fold_curve(scene.replace(mesh=mesh, degree=degree), start=point, **asked))
+    one, best = curves
+    assert one.status is fm.Status.CONVERGED
+    assert one.equilibria[0].scene.mesh.accuracy == 1e-7
+    assert unknowns(one.equilibria[0].scene) < 40
+    assert one.values[-1] == best.values[-1] == 3.0
+    for k in (0, -1):
+        assert one.pressure[k] == pytest.approx(best.pressure[k], rel=1e-7)
+    assert one.timings["mesh"] > 0
+
+
+def test_runs_over_numbers():
+    """Loads and traces over a number have the mesh of all their states."""
+    scene = asking(ABOVE, 1e-7)
+    values = fm.vary(scene, "source.0.strength", [100.0, 200.0], hold={"pressure": 1.0})
+    traced = fm.trace(scene, over="source.0.strength", hold={"volume": 5.0}, until={"source.0.strength": 300.0})
+    for branch in (values, traced):
+        assert branch.status is fm.Status.CONVERGED
+        assert len({eq.scene.mesh for eq in branch}) == 1
+        assert max(eq.error_estimate().pressure.relative for eq in branch) < 1e-7
+
+
 def test_one_equilibrium():
     table = points("dipole_below")[2].expected
     eq = fm.equilibrium(asking(SCENES["dipole_below"], 1e-7), volume=table["volume"])
@@ -280,12 +337,7 @@ def test_states_that_depend_on_the_mesh():
     assert e.value.status is fm.Status.ACCURACY_NOT_MET
 
 
-def fold_curve(scene):
-    point = fm.trace(disc_scene(OGDEN, (1.0, 6.5), elements=8), start=1.0, until={"volume": 5.0}).special_points[0]
-    return fm.fold_curve(scene, start=point, parameter="membrane.susceptibility", bounds=(1.0, 3.0))
-
-
-@pytest.mark.parametrize("verb", [lambda s: fm.equilibria(s, pressure=1.0), lambda s: next(fm.trace_iter(s)), fold_curve])
+@pytest.mark.parametrize("verb", [lambda s: next(fm.trace_iter(s))])
 def test_where_no_mesh_is_chosen(verb):
     with pytest.raises(fm.InputError, match=r"mesh\.accuracy = 1e-06: no mesh is chosen for it here"):
         verb(asking(disc_scene(OGDEN, (1.0, 6.5)), 1e-6))

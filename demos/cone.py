@@ -21,6 +21,7 @@ import numpy as np
 
 import femmembrane as fm
 from femmembrane.files import write_csv
+from femmembrane.quantities import axis_label
 from femmembrane.views import plots
 
 SCENE = fm.Scene(
@@ -50,6 +51,7 @@ def errors(mesh: fm.Disc, degree: int) -> tuple[float, float, float]:
 def draw(rows: list[tuple[str, int, int, float, float, float]], path: Path) -> None:
     figure, (left, right) = plots.new_figure((10.5, 4.8), title=SCENE.title, widths=(1, 1.3))
     plots.draw_profile(left, fm.equilibrium(SCENE.replace(mesh=geometric(64), degree=4), pressure=0.0), plots.BOTH)
+    left.set(xlabel=axis_label("rho"), ylabel=axis_label("eta"))
     for degree, color in zip(DEGREES, ("#999999", "#0072b2", "#d55e00", "#222222"), strict=True):
         for mesh, line in (("even", "-"), ("geometric", "--")):
             points = [(n, e) for kind, d, n, e, _, _ in rows if kind == mesh and d == degree]

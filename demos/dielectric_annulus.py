@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     figure, axes = plots.new_figure((7.2, 4.8), title=SCENE.title)
     names = ("pre-stretch", "wrinkles from", "pulled in at", "hub zone to", "rim zone from")
     rows = []
-    for prestretch, color in zip(PRESTRETCHES, ("#0072b2", "#d55e00", "#222222"), strict=True):
+    for prestretch, color, dashes in zip(PRESTRETCHES, ("#0072b2", "#d55e00", "#222222"), ("-", "--", ":"), strict=True):
         way = {"over": "electric.voltage", "hold": {"pressure": PRESSURE}, "until": {"electric.voltage": 1.0}}
         branch = fm.trace(SCENE.replace(prestretch=prestretch), **way, steps=fm.StepControl(largest=0.06), max_steps=200, throw=False)
         known = branch[:-1]  # the last state is pulled in already
@@ -68,14 +68,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         begins = int(np.argmax(zones[:, 0] > 0.3))
         rows.append((prestretch, voltage[begins], branch[-1].voltage, *zones[-1]))
         assert (np.diff(zones[begins:, 0]) > 0).all()  # it grows
-        axes.plot(voltage[begins:], zones[begins:, 0], color=color, label=f"pre-stretch {prestretch:g}")
+        axes.plot(voltage[begins:], zones[begins:, 0], dashes, color=color, label=f"pre-stretch {prestretch:g}")
         if zones[-1, 1] < 1:
             at = zones[:, 1] < 1
-            axes.plot(voltage[at], zones[at, 1], color=color)
+            axes.plot(voltage[at], zones[at, 1], dashes, color=color)
             axes.fill_between(voltage[at], zones[at, 1], 1.0, color=color, alpha=0.12, linewidth=0)
         axes.fill_between(voltage[begins:], 0.3, zones[begins:, 0], color=color, alpha=0.12, linewidth=0)
         axes.plot(voltage[-1], zones[-1, 0], "X", color=color, markersize=9, label=None if prestretch > 1 else "pulled in at the hub")
-    axes.set(xlabel="voltage phi", ylabel="reference radius r/R0", ylim=(0.3, 1.0))
+    axes.fill_between([], [], color="0.85", label="wrinkled: next to the hub, and to the rim")
+    axes.set(xlabel="voltage φ", ylabel="reference radius r/R₀", ylim=(0.3, 1.0))
     axes.legend(frameon=False)
     plots.save_figure(figure, out / "dielectric_annulus.png")
     write_csv(out / "zones.csv", names, rows)

@@ -145,13 +145,13 @@ def _check(loops: dict[tuple[float, float, float], Loop]) -> None:
 def _draw(loops: dict[tuple[float, float, float], Loop], path: Path) -> None:
     figure, axes = plots.new_figure((10.6, 4.6), title=SCENE.title, widths=(1.0, 1.0))
     for axis, (prestretch, first) in zip(axes, SHOWN, strict=True):
-        for chamber, color in zip(CHAMBERS, ("#56b4e9", "#0072b2", "#d55e00", "#222222"), strict=True):
-            shown, name = loops[prestretch, first, chamber], f"chamber {chamber:g} R0^3"
+        for chamber, color, dashes in zip(CHAMBERS, ("#56b4e9", "#0072b2", "#d55e00", "#222222"), ("-", "--", "-.", ":"), strict=True):
+            shown, name = loops[prestretch, first, chamber], f"chamber {chamber:g} R₀³"
             for branch in (shown.branch, shown.large):
                 if branch is not None:
-                    axis.plot([eq.voltage for eq in branch], [shown.area(eq) for eq in branch], color=color, label=name)
+                    axis.plot([eq.voltage for eq in branch], [shown.area(eq) for eq in branch], dashes, color=color, label=name)
                     name = None
-        axis.set(xlabel="voltage phi", yscale="log", title=f"pre-stretch {prestretch:g}, first pressure {first:g}")
+        axis.set(xlabel="voltage φ", yscale="log", title=f"pre-stretch {prestretch:g}, first pressure {first:g}")
         axis.grid(color="0.9", linewidth=0.6)
     axes[0].set_ylabel("capacitance over its first value")
     axes[0].legend(frameon=False, fontsize=9, loc="upper left")

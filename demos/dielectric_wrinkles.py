@@ -96,8 +96,8 @@ def _draw(rows: list[tuple[float, float, float, float, str, int]], limits: list[
     figure, axes = plots.new_figure((7.6, 4.8), title=SCENE.title)
     kinds = {"taut, stable": ("o", "#0072b2"), "wrinkled, stable against all n tried": ("s", "#56b4e9")}
     kinds |= {
-        f"wrinkled, unstable from n = {n} on": ("^", color)
-        for n, color in zip(WAVES[:2:-1], ("#e69f00", "#d55e00", "#a01040"), strict=False)
+        f"wrinkled, unstable from n = {n} on": (marker, color)
+        for n, marker, color in zip(WAVES[:2:-1], "^vD", ("#e69f00", "#d55e00", "#a01040"), strict=False)
     }
     for name, (marker, color) in kinds.items():
         last = name.removesuffix(" on").rpartition(" ")[2]
@@ -109,7 +109,7 @@ def _draw(rows: list[tuple[float, float, float, float, str, int]], limits: list[
         if chosen:
             axes.plot([row[0] for row in chosen], [row[1] for row in chosen], marker, color=color, markersize=8, label=name)
     axes.plot(SQUARES, limits, "-", color="0.3", label="limit point of the branch")
-    axes.set(xlabel="phi^2", ylabel="pressure P", yscale="log")
+    axes.set(xlabel="φ²", ylabel="pressure P = p R₀/(μT)", yscale="log")
     axes.legend(frameon=False, fontsize=9, loc="lower left")
     plots.save_figure(figure, path)
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import femmembrane as fm
-from femmembrane.views.plots import new_figure, save_figure
+from femmembrane.views.plots import new_figure, save_figure, tell_apart
 
 STRETCH = np.array([1.027, 1.065, 1.115, 1.14, 1.2, 1.31, 1.42, 1.68, 1.94, 2.49, 3.03, 3.43, 3.75, 4.07, 4.26, 4.45])
 STRESS = np.array(
@@ -69,13 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "statistical theory, Treloar (1944)": (fm.NeoHookean(), 4 * KILOGRAM_PER_CM2),
     }
     figure, axes = new_figure((7.0, 4.8), title="Treloar's rubber in equibiaxial tension")
+    tell_apart(axes)
     axes.plot(STRETCH, STRESS, "o", color="#222222", ms=5, label="measured, Treloar (1944)", zorder=3)
     print(f"\n{'root mean square deviation from the points':<46}MPa")
     stretch = np.linspace(1.0, 4.5, 200)
     for name, (material, modulus) in published.items():
         left = scatter(nominal(material, modulus, STRETCH))  # type: ignore[arg-type]
         print(f"{name:<46}{left:.4f}")
-        axes.plot(stretch, nominal(material, modulus, stretch), "--", label=name)  # type: ignore[arg-type]
+        axes.plot(stretch, nominal(material, modulus, stretch), label=name)  # type: ignore[arg-type]
     for key in ("yeoh", "ogden-2", "gent", "neo-hookean"):
         fit = models[key].fit
         left = scatter(fit.columns[0].predicted)

@@ -68,15 +68,24 @@ def _draw(branch: fm.Branch, stages: Sequence[fm.Equilibrium], path: Path) -> No
         profile = eq.profile()
         rho, eta = profile["rho"], profile["eta"]
         shape.plot(np.append(-rho[::-1], rho), np.append(eta[::-1], eta), color=color, label=f"P = {eq.pressure:.3g}")
-        along.plot(profile["r"], profile["contact_pressure"], color=color)
+        along.plot(*_pressure_over_radius(eq), color=color)
     shape.set(xlabel="rho/R0", ylabel="eta/R0", aspect="equal")
     shape.legend(frameon=False, fontsize=9)
-    line.plot(branch.column("pressure"), branch.column("contact_force"), color="#222222", marker="o", markersize=3)
-    line.set(xlabel="pressure P", ylabel="force on the ball over mu T R0")
+    plots.draw_branch(line, branch, across="pressure", up="contact_force", style=plots.PLAIN)
+    line.legend(*plots.legend_entries(line), frameon=False, fontsize=9)
     along.set(xlabel="reference radius r/R0", ylabel="pressure of contact over mu T/R0")
-    for axis in (line, along):
-        axis.grid(color="0.9", linewidth=0.6)
+    along.grid(color="0.9", linewidth=0.6)
     plots.save_figure(figure, path)
+
+
+def _pressure_over_radius(eq: fm.Equilibrium) -> tuple[np.ndarray, np.ndarray]:
+    """The pressure of contact, which jumps to zero at the border of contact."""
+    r, pressure = np.zeros(0), np.zeros(0)
+    for zone in eq.contact.zones:
+        inside = np.linspace(zone.start, zone.stop, 60)
+        r, pressure = np.append(r, inside), np.append(pressure, eq.contact.pressure(inside))
+    border = r[-1] if r.size else 0.0
+    return np.concatenate([r, [border, 1.0]]), np.concatenate([pressure, [0.0, 0.0]])
 
 
 if __name__ == "__main__":

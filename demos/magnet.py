@@ -26,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.constants import mu_0
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 import femmembrane as fm
@@ -91,9 +92,13 @@ def sinking(name: str, modulus: float, gaps: Sequence[float]) -> list[float]:
 
 def draw(curves: dict[str, tuple[np.ndarray, list[float]]], path: Path) -> None:
     figure, axes = plots.new_figure((7.2, 4.8), title="An unloaded membrane above a magnet of 10 mm x 5 mm")
+    plots.tell_apart(axes)
     for label, (gaps, heights) in curves.items():
-        (line,) = axes.plot(gaps * 1e3 * RADIUS, np.array(heights) * 1e3 * RADIUS, label=label)
-        axes.plot(gaps[-1] * 1e3 * RADIUS, heights[-1] * 1e3 * RADIUS, "o", color=line.get_color())
+        points = 1e3 * RADIUS * np.stack([gaps, heights], axis=1)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        curve = CubicSpline(along, points)(np.linspace(0, along[-1], 200))
+        (line,) = axes.plot(*curve.T, label=label)
+        axes.plot(*points[-1], "o", color=line.get_color())
     axes.plot([0, 16], [0, -16], "--", color="0.5", label="face of the magnet")
     axes.set(xlabel="distance of the face below the rim, mm", ylabel="height of the pole, mm", xlim=(3, 16), ylim=(-6, 0.5))
     plots.draw_legend(axes, loc="lower right")

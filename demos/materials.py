@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import femmembrane as fm
-from femmembrane.views.plots import new_figure, save_figure
+from femmembrane.views.plots import new_figure, save_figure, tell_apart
 
 MATERIALS = {
     "neo-Hookean": fm.NeoHookean(),
@@ -43,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
 
     figure, axes = new_figure((8.0, 5.0), title="A clamped disc inflated, by material")
+    tell_apart(axes)
     limits: dict[str, list[float]] = {}
     print(f"{'material':32}{'P at V = 2':>12}{'last V':>9}{'last P':>9}   limit points")
     for name, material in MATERIALS.items():

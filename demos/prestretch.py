@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 
 import femmembrane as fm
 from femmembrane.accuracy.shooting import shoot
@@ -70,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
 
     figure, axes = new_figure((8.0, 5.0), title="A disc stretched over its rim, then inflated")
+    colors = iter(colormaps["viridis"](np.linspace(0.0, 0.85, len(STRETCHES))))  # from dark to light
     rows = []
     print(f"{'pre-stretch':>11}{'P max':>11}{'at V':>10}{'P min':>11}{'at V':>10}{'neo-Hookean: P max':>20}{'P max p':>10}")
     for p in STRETCHES:
@@ -81,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         shown = "".join(f"{value:{width}.{digits}f}" for value, width, digits in zip(numbers, (11, 10) * 2, (6, 3) * 2, strict=True))
         print(f"{p:11.2f}{shown.replace('nan', '  -')}{soft.pressure:20.6f}{soft.pressure * p:10.6f}")
         volume, pressure = branch.column("volume"), branch.column("pressure")
-        (line,) = axes.plot(volume, pressure, label=f"p = {p:g}")
+        (line,) = axes.plot(volume, pressure, color=next(colors), label=f"p = {p:g}")
         axes.plot([eq.volume for eq in found], [eq.pressure for eq in found], "o", color=line.get_color(), ms=4)
     with (asked.out / "prestretch.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([["prestretch", "P_max", "V_max", "P_min", "V_min", "P_max_neo_hookean"], *rows])

@@ -128,7 +128,7 @@ def main() -> None:
             print(found)
             found.save(given.out / f"{side}-{name}.nc")
             show = {
-                "limits": ["limit_points", "limit_pressure.0", "limit_pressure.1"],
+                "limits": ["limit_points", "limit_pressure#2", "limit_pressure#3"],
                 "tipping": ["onset_center_height", "onset_pressure"],
             }
             found.plot(given.out / f"{side}-{name}.png", show=show.get(name))

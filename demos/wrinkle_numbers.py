@@ -42,7 +42,7 @@ SOUGHT = {"8a": (0.0, -0.2), "8b": (0.0, -0.3)}
 THICKNESSES = (100.0, 1000.0, 10000.0)
 COLUMNS = ("figure", "strength", "height", "center_height", "pressure", "compressed", "waves", "wavelength", "lambda")
 ONSETS = ("figure", "radius_to_thickness", "center_height", "pressure", "waves", "wavelength")
-COLOURS = ("#009e73", "#0072b2", "#d55e00")
+LOOKS = (("#56b4e9", "^"), ("#0072b2", "o"), ("#d55e00", "s"))
 
 
 def scene(strength: float, height: float, ratio: float = 1000.0) -> fm.Scene:
@@ -92,19 +92,19 @@ def onset(of: fm.Scene, heights: tuple[float, float], accuracy: float = 1e-3) ->
 def draw(path: Path, ratios: Sequence[float], count: int) -> None:
     """Eigenvalues over n for some thicknesses, and the worst number over the height of the pole."""
     figure, (left, right) = plots.new_figure((10.5, 4.4), widths=(1.0, 1.0))
-    for ratio, colour in zip(ratios, COLOURS, strict=False):
+    for ratio, (colour, marker) in zip(ratios, LOOKS, strict=False):
         eq = fm.equilibrium(scene(400.0, -3.25, ratio), center_height=-0.3)
         numbers = sorted({round(n) for n in np.linspace(1, 0.25 * ratio, count)})
         values = [eq.verdict(azimuthal=n).smallest_eigenvalue / ratio**2 for n in numbers]
-        left.plot(np.array(numbers) / ratio, values, ".", color=colour, markersize=4, label=f"R₀/T = {ratio:g}")
+        left.plot(np.array(numbers) / ratio, values, marker, color=colour, markersize=3, label=f"R₀/T = {ratio:g}")
     left.axhline(0, color="black", linewidth=0.8)
     left.set(xlabel="n T/R₀", ylabel="smallest eigenvalue λ (T/R₀)²", title="M = 400, h = -3.25, pole at -0.3", ylim=(-0.05, 0.02))
     plots.draw_legend(left)
-    for ratio, colour in zip(ratios, COLOURS, strict=False):
+    for ratio, (colour, marker) in zip(ratios, LOOKS, strict=False):
         heights = np.linspace(-0.1, -0.5, max(3, count // 6))
         worst = [fm.equilibrium(scene(400.0, -3.25, ratio), center_height=height).verdict(azimuthal="all").azimuthal for height in heights]
-        right.semilogy(heights, worst, "o", color=colour, markersize=3.5, label=f"R₀/T = {ratio:g}")
-    right.set(xlabel="height of the pole", ylabel="worst number of waves", title="M = 400, h = -3.25")
+        right.semilogy(heights, worst, marker, color=colour, markersize=4, label=f"R₀/T = {ratio:g}")
+    right.set(xlabel="pole height η(0)/R₀", ylabel="worst number of waves", title="M = 400, h = -3.25")
     plots.draw_legend(right)
     plots.save_figure(figure, path)
 

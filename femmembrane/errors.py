@@ -90,6 +90,8 @@ class InputError(FemmembraneError, ValueError):
     """
 
     def __init__(self, key: str, value: Any, allowed: str) -> None:
+        if (meant := as_meant(value)) and "comma" not in allowed and (meant != _QUOTED or "number" in allowed):
+            allowed = f"{allowed}; {meant}"
         self.key, self.value, self.allowed = key, value, allowed
         super().__init__(printable(f"{_cut(key)} = {_cut(_shown(value))}: {allowed}"))
 
@@ -135,6 +137,57 @@ def unknown_name(key: str, name: str, known: Iterable[str]) -> InputError:
 def printable(text: str) -> str:
     """A text that may be written to a terminal: control characters, which could move its cursor, are spelled out (\\x1b)."""
     return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+#: a text that a person reads as a number, perhaps with a unit behind it: sign, digits with their marks, exponent, unit
+_READ = re.compile(
+    r"\s*([+\-\N{MINUS SIGN}]?)((?:\d[\d.,'_\N{RIGHT SINGLE QUOTATION MARK}\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE} ]*)?\d)"
+    r"((?:[eE][+-]?\d{1,3})?)\s*([^\s\d.,'_].{0,20})?",
+    re.ASCII,
+)
+#: digits with marks between thousands
+_GROUPED = re.compile(r"\d{1,3}(?:[^\d]\d{3})+")
+_QUOTED = "a text in quotes is no number: leave the quotes out, or write its unit behind it"
+#: characters of a text that is looked at
+_LONGEST_NUMBER = 60
+
+
+def as_meant(value: Any) -> str:
+    """How a number would be written that a text was meant as: one with a decimal comma, with marks between thousands, or in quotes.
+
+    Parameters
+    ----------
+    value : object
+        Whatever was refused; the answer is empty unless it is a text that looks like a number.
+    """
+    if not isinstance(value, str) or len(value) > _LONGEST_NUMBER or (found := _READ.fullmatch(value)) is None:
+        return ""
+    sign, digits, exponent, unit = found.groups(default="")
+    behind = f"{exponent} {unit.strip()}".rstrip()
+    sign = "-" if sign == "\N{MINUS SIGN}" else sign
+    if digits.isdigit() or re.fullmatch(r"\d*\.\d*", digits):
+        if found[1] == "\N{MINUS SIGN}":
+            return f"write {sign}{digits}{behind} (its minus is another character)"
+        return "" if unit else _QUOTED
+    texts = _without_marks(digits)
+    if not texts:
+        return ""
+    numbers = " or ".join(f"{sign}{text}{behind}" for text in texts)
+    return f"write {numbers}: decimals stand behind a point, and nothing stands between thousands, no comma either"
+
+
+def _without_marks(digits: str) -> list[str]:
+    """The numbers that digits with marks between them may be."""
+    marks = re.sub(r"\d", "", digits)
+    whole, last = digits[: digits.rfind(marks[-1])], digits[digits.rfind(marks[-1]) + 1 :]
+    alone = marks[-1] in ".," and marks.count(marks[-1]) == 1
+    found = []
+    grouped = whole.isdigit() or (len(set(marks[:-1])) == 1 and _GROUPED.fullmatch(whole) is not None)
+    if alone and grouped and (marks[-1] == "," or len(marks) > 1):
+        found.append(f"{re.sub(r'[^0-9]', '', whole)}.{last}")
+    if len(set(marks)) == 1 and marks[-1] != "." and _GROUPED.fullmatch(digits):
+        found.append(re.sub(r"[^0-9]", "", digits))
+    return found
 
 
 #: items of a list that a message may show

@@ -245,6 +245,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "amplitude": Quantity("root mean square of the part of the displacement that has waves around the axis, over R0"),
     "shift": Quantity("displacement of the pole across the axis, over R0"),
     "harmonics": Quantity("number of harmonics around the axis beside the constant one", type=int),
+    "wave_size": Quantity("size of the part of the displacement that has waves, over R0"),
     "truncation": Quantity("estimated root mean square of the harmonics left out, over R0"),
     "postbuckling": Quantity("whether it sets in gradually (supercritical) or with a jump (subcritical) at a held volume", type=str),
     "postbuckling_coefficient": Quantity("its coefficient b of Koiter at a held volume, over mu T R0^2", words="coefficient b"),
@@ -312,6 +313,14 @@ QUANTITIES: Mapping[str, Quantity] = {
     "volume_folds": Quantity("number of volume folds", words="number of volume folds"),
     "azimuthal_onsets": Quantity("number of azimuthal onsets", words="number of azimuthal onsets"),
     "onset_waves": Quantity("number of waves around the axis of the onsets"),
+    **{
+        name: text
+        for tag, points in (("limit", "limit point"), ("fold", "volume fold"), ("onset", "onset"))
+        for name, text in (
+            (f"{tag}_identity", Quantity(f"which {points} it is: the same number in all scenes, 0 of one that no scene beside surely has")),
+            (f"{tag}_cut", Quantity(f"whether the {points} has another number in a neighbouring scene, from a way round (1 or 0)")),
+        )
+    },
     "wrinkled_fraction": Quantity("part of the reference area that is wrinkled, along the branch"),
     "largest_wrinkled_fraction": Quantity(
         "largest part of the reference area that is wrinkled on the branch", label="largest wrinkled part of the area"

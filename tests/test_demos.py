@@ -18,6 +18,7 @@ DEMOS = Path(__file__).parents[1] / "demos"
 #: options that make a demo quick enough for every test run; without an entry it is run whole
 QUICK = {
     "timings.py": ["--quick"],
+    "plates.py": ["--quick"],
     "sweep.py": ["--quick"],
     "verdict_cost.py": ["--quick"],
     "wrinkle_numbers.py": ["--quick"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import tomllib
@@ -11,12 +10,13 @@ from pathlib import Path
 
 import demo_pages
 import drawings
+import notebook_pages
 from demo_pages import DEMOS, ROOT
+from notebook_pages import NOTEBOOKS
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
 HERE = Path(__file__).parent
-NOTEBOOKS = DEMOS / "notebooks"
 #: a page that stands elsewhere in the repository, in the words of MyST; options are read here
 INCLUDE = re.compile(r"```\{include\} (\S+)\n((?::.*\n)*)```\n?")
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
@@ -34,7 +34,7 @@ def generate(app: Sphinx, config: Config) -> None:
     demo_pages.stage(here, config.sphinx_gallery_conf["filename_pattern"])
     drawings.draw(here / "generated" / "drawings")
     write(here / "generated" / "scenes.rst", scenes(here))
-    write(here / "generated" / "notebooks.rst", notebooks(here))
+    write(here / "generated" / "notebooks.rst", notebook_pages.page(here))
     for name, text in reference():
         write(here / "generated" / "reference" / f"{name}.rst", text)
 
@@ -50,21 +50,6 @@ def scenes(here: Path) -> str:
         if (DEMOS / "pictures" / f"{path.stem}.png").exists():
             parts += [f".. image:: {relative(DEMOS / 'pictures' / f'{path.stem}.png', here / 'generated')}", "   :alt: " + title, ""]
         parts += [f".. literalinclude:: {relative(path, here / 'generated')}", "   :language: toml", ""]
-    return "\n".join(parts)
-
-
-def notebooks(here: Path) -> str:
-    """Words and code of the notebooks, each with the file to open."""
-    parts = ["Notebooks", "=========", "", "To be opened in Jupyter, where they show branches to click through.", ""]
-    for path in sorted(NOTEBOOKS.glob("*.ipynb")):
-        file = relative(path, here / "generated")
-        parts += [path.name, "-" * len(path.name), "", f":download:`{path.name} <{file}>`", ""]
-        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
-            text = "".join(cell["source"])
-            if cell["cell_type"] == "code":
-                parts += [".. code-block:: python", "", *(f"    {line}" for line in text.splitlines()), ""]
-            else:
-                parts += [demo_pages.restructured(re.sub(r"^#+ ", "", text, flags=re.MULTILINE)), ""]
     return "\n".join(parts)
 
 

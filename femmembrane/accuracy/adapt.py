@@ -38,6 +38,7 @@ from .yardstick import Yardstick, accuracy_of, can_hold, controls_of, error_acro
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
+    from ..results.contact import Contact
 
 #: from a scene with a mesh to the equilibria that are wanted, or a part of them
 Follow = Callable[[Scene], "Branch"]
@@ -61,6 +62,8 @@ SHARE = 0.6
 #: share and inner radius of the elements that go to the pole when its height is held: the response to a force on the pole, which decides
 #: how a height converges, is logarithmic there
 _POLE_SHARE, _POLE_RADIUS = 0.3, 0.005
+#: smallest density of elements in a zone of contact over that beyond its borders
+_IN_CONTACT = 0.5
 #: smallest density of elements over the mean
 _LEAST_DENSITY = 0.1
 
@@ -204,13 +207,16 @@ class Trial:
 
     def density(self) -> tuple[Array, Array]:
         """Points s and the density of elements there that suits all states."""
-        space = self.space
-        first, last = space.ends[[0, -1]]
-        centres, s = (space.ends[1:] + space.ends[:-1]) / 2, np.linspace(first, last, 40 * self.elements + 1)
+        first, last = self.space.ends[[0, -1]]
+        s = np.linspace(first, last, 40 * self.elements + 1)
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
         for eq, weight in zip(self.states, weights, strict=True):
-            density = np.maximum(_misses(space, eq.of_branch.state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+            state, space = eq.of_branch.state, eq.of_branch.potential.space
+            centres = (space.ends[1:] + space.ends[:-1]) / 2
+            density = np.maximum(_misses(space, state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
+            if (contact := eq.of_branch.contact) is not None:
+                density = _with_contact(density, space, contact)
             smooth = np.exp(np.interp(s, centres, np.log(density)))
             total = np.maximum(total, weight * smooth / smooth.mean())
         total = np.maximum(total / total.mean(), _LEAST_DENSITY)
@@ -234,7 +240,8 @@ class Trial:
                 state = _followed(potential, here, State.of(result), held)
                 if state is None:
                     continue
-                error = relative_error(state.evaluation.potential, state.x, state.pressure, self.controls, self.yardstick)
+                own = state.evaluation
+                error = relative_error(own.potential, own.x, state.pressure, self.controls, self.yardstick)
                 return error if np.isfinite(error) else np.inf
         return self._met(here, eq) if len(self.controls) > 1 else np.inf
 
@@ -299,11 +306,22 @@ def trial_mesh(mesh: Meridian, elements: int) -> Meridian:
     return mesh.on_ends(graded(np.array([first, last]), np.ones(2), elements, corners))
 
 
+def _with_contact(density: Array, space: Space, contact: Contact) -> Array:
+    """A density of elements that does not fall to nothing in zones of contact, where little is to be described: borders take ends there."""
+    centres, density = (space.ends[1:] + space.ends[:-1]) / 2, density.copy()
+    for zone in contact.zones:
+        inside = (centres > zone.start) & (centres < zone.stop)
+        beyond = np.flatnonzero(inside[1:] != inside[:-1])
+        beyond = np.where(inside[beyond], beyond + 1, beyond)
+        density[inside] = np.maximum(density[inside], _IN_CONTACT * density[beyond].max(initial=0.0))
+    return density
+
+
 def _misses(space: Space, x: Array) -> Array:
     """The part of a state that elements of the grading degree miss, for each element: the integral of the squared slopes of the difference,
     over the sum of all.
     """
-    low = space_of(space.mesh, _GRADING_DEGREE, ends=tuple(space.ends))
+    low = space_of(space.mesh.on_ends(tuple(space.ends.tolist())), _GRADING_DEGREE)
     missed = x - transferred(low, transferred(space, x, low), space)
 
     def slopes(y: Array) -> Array:

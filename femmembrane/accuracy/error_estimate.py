@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
+from ..results.contact import contact_of
 from ..results.error_estimate import ErrorEstimate, from_numbers
 from ..results.verdict import Verdict
 from ..scene import MAX_DEGREE, Scene
@@ -64,10 +65,11 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     found, reason = same_state(finer, potential, x, pressure, evaluation, control)
     if found is None:
         return _without(control, values, method, reason)
-    better, reason = _verdicts(finer, found.evaluation, potential, verdicts)
-    errors = _errors(control, values, _numbers(finer, found.evaluation.x, found.pressure, found.evaluation, better))
+    own = found.evaluation.potential  # its elements may follow borders
+    better, reason = _verdicts(own, found.evaluation, potential, verdicts)
+    errors = _errors(control, values, _numbers(own, found.evaluation.x, found.pressure, found.evaluation, better))
     if potential.scene.degree in _RECOVERED and finer.scene.degree == potential.scene.degree + 1:
-        errors |= _stress_errors(values, finer, found, control)
+        errors |= _stress_errors(values, own, found, control)
     errors["displacement"] = finer.space.unit * distance(finer, found.x, transferred(potential.space, x, finer.space))
     return from_numbers(control, values, errors, method, reason)
 
@@ -93,9 +95,14 @@ def finer_space(potential: Potential, evaluation: Evaluation, pressure: float) -
     """The scene on finer elements, and in words."""
     scene = potential.scene
     better = finer_scene(scene)
+    inside = ""
     if scene.tension_field and (evaluation.stress <= 0).any() and not on_its_borders(scene, evaluation.x, pressure):
+        inside = "wrinkled zones"
+    elif potential.obstacles and not all(zone.followed and zone.smooth for zone in contact_of(evaluation).zones):
+        inside = "contact, or edges of bodies,"
+    if inside:
         better = scene.replace(mesh=scene.mesh.refined().refined(), degree=min(scene.degree + 1, MAX_DEGREE))
-        what = f"quartered elements of degree {better.degree}, for borders of wrinkled zones inside elements: rough"
+        what = f"quartered elements of degree {better.degree}, for borders of {inside} inside elements: rough"
     else:
         what = f"elements of degree {better.degree}" if better.degree > scene.degree else f"halved elements of degree {better.degree}"
     return better, f"hierarchical: against the same load on {what}"
@@ -113,11 +120,11 @@ def same_state(
     def judged(result: NewtonResult) -> str:
         if result.status is not Status.CONVERGED:
             return f"the finer space has no equilibrium near at this {kind.words}"
-        if _side(finer, result.evaluation, control) != side:
+        if _side(result.evaluation.potential, result.evaluation, control) != side:
             return "in the finer space the state lies beyond a fold"
         if (change := moved(finer, result.x, start)) > FAR:
             return f"the membrane of the finer space is {change:.0%} off, so the mesh is too coarse for an estimate"
-        bad = ill_posed(finer, result.evaluation)
+        bad = ill_posed(result.evaluation.potential, result.evaluation)
         return f"in the finer space {bad}" if bad is not None else ""
 
     result = solved_in(finer, held, potential, x, pressure)
@@ -156,12 +163,13 @@ def _verdicts(
 def _stress_errors(values: Mapping[str, float], finer: Potential, found: NewtonResult, control: str) -> dict[str, float]:
     """Errors of the stresses at the ends, against elements of one degree more than the finer ones."""
     kind = CONTROLS[control]
-    held = kind.at(kind.value(finer.space, found.x, found.pressure, found.evaluation.volume))
+    x = found.evaluation.x
+    held = kind.at(kind.value(finer.space, x, found.pressure, found.evaluation.volume))
     finest = potential_of(finer_scene(finer.scene))
-    best = solved_in(finest, held, finer, found.x, found.pressure)
+    best = solved_in(finest, held, finer, x, found.pressure)
     if best.status is not Status.CONVERGED:
         return dict.fromkeys(("stress_first", "stress_last"), np.nan)
-    stresses = _end_stresses(finest, best.x, best.pressure)
+    stresses = _end_stresses(best.evaluation.potential, best.evaluation.x, best.pressure)
     return {name: values[name] - stresses[name] for name in stresses}
 
 

@@ -79,7 +79,7 @@ def _errors(
         errors["profile"] = moved(finer, better.x, transferred(potential.space, x, finer.space))
     if "eigenvalues" in yardstick.asked:
         try:
-            pairs = [_eigenvalues(potential, evaluation), _eigenvalues(finer, better.evaluation)]
+            pairs = [_eigenvalues(potential, evaluation), _eigenvalues(better.evaluation.potential, better.evaluation)]
         except SpectrumError:
             return {**errors, "eigenvalues": np.inf}
         values = np.maximum(np.abs(pairs[1]), yardstick.eigenvalues)

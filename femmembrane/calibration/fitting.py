@@ -18,6 +18,7 @@ from .design import errors_of
 from .laws import Law
 from .least_squares import Estimate, Problem
 from .measured import Measured
+from .readings import suspicions
 from .resampling import refits
 from .simple import Simple
 from .statistics import (
@@ -109,7 +110,7 @@ def fitted(law: Law, tests: Sequence[Measured], *, starts: int, intervals: str, 
         noise={_column_name(t, b.name): b.level / t.table.factors.get(b.name, 1.0) for t, b in problem.blocks if b.noise.unknown},
         log_likelihood=_log_likelihood(problem, chi_square),
         status=Status.CONVERGED if estimate.converged else Status.NOT_CONVERGED,
-        notes=tuple(_notes(law, problem, estimate)),
+        notes=(*_notes(law, problem, estimate), *(suspicions(law, tests, problem, estimate) if advise else ())),
         seconds=time.perf_counter() - clock,
         evaluations=problem.evaluations,
     )

@@ -31,9 +31,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import as_float
-from ..errors import InputError
+from ..errors import InputError, as_meant
 from ..physics.scales import Scales
-from ..physics.units import in_unit
+from ..physics.units import has_unit, in_unit
 from ..quantities import QUANTITIES, SI_UNITS
 
 Array = NDArray[np.float64]
@@ -245,9 +245,9 @@ def _refuse_other_delimiters(name: str, kept: Sequence[tuple[int, str]]) -> None
         if mark in header:
             decimal = next((n for n, line in kept[1:] if re.search(r"\d,\d", line)), None)
             comma = f", and line {decimal} has decimal commas" if decimal else ""
-            raise InputError(
-                name, header, f"line {number} separates its columns by {word}{comma}; commas between columns and decimal points are allowed"
-            )
+            known = f"pandas.read_csv({name!r}, sep={mark!r}{', decimal=' + repr(',') if decimal else ''})"
+            allowed = f"commas between columns and decimal points are allowed; {known} reads such a table"
+            raise InputError(name, header, f"line {number} separates its columns by {word}{comma}; {allowed}")
     if (
         "," not in header
         and len(header.split()) > 1
@@ -274,6 +274,8 @@ def _quantity(table: str, header: str) -> tuple[str, bool, str]:
                 own_unit, deviation = own_unit[: -len(ending)], True
         base = _ALIASES.get(base, base)
         if base in KINDS and (own_unit in ("", "%") or KINDS[base]):
+            if own_unit and unit and _unit_text(own_unit) != _unit_text(unit):
+                raise InputError(table, header, f"it names two units, {own_unit!r} and {unit!r}; one of them is allowed")
             return base, deviation, "" if (own_unit or unit) in ("1", "-") else own_unit or unit
     lowered = word.lower()
     if (
@@ -312,7 +314,8 @@ def _without_copies(name: str, found: list[tuple[str, str, bool, str]]) -> list[
 
 def _example(header: str) -> str:
     quantity = _quantity("", header)[0]
-    return {"pressure": "pressure_kPa", "length": f"{quantity}_mm", "volume": "volume_ml", "stress": f"{quantity}_MPa"}[KINDS[quantity]]
+    units = {"pressure": "kPa", "length": "mm", "volume": "ml", "stress": "MPa"}
+    return f"{quantity}_{units[KINDS[quantity]]}" if KINDS[quantity] else f"{quantity}, a ratio without a unit"
 
 
 def _factor(name: str, header: str, quantity: str, unit: str, scales: Scales | None, units: str | None) -> float:
@@ -335,7 +338,7 @@ def _factor(name: str, header: str, quantity: str, unit: str, scales: Scales | N
     try:
         size = in_unit(header, f"1 {_unit_text(unit)}", SI_UNITS[kind])[0]
     except InputError as error:
-        raise InputError(name, header, f"column {header!r}: {error.allowed}") from None
+        raise InputError(name, header, f"column {header!r}: {error.allowed}; its unit is read as {unit!r}") from None
     return scales.from_si(kind, size)
 
 
@@ -357,8 +360,13 @@ def _number(name: str, row: int, header: str, cell: Any) -> float:
     value = _parsed(cell) if isinstance(cell, str) else as_float(cell)
     if math.isfinite(value):
         return value
-    if isinstance(cell, str) and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell):
-        raise InputError(where, cell, "it has a decimal comma; a decimal point is allowed")
+    if isinstance(cell, str) and "," in cell and as_meant(cell):
+        raise InputError(where, cell, f"it has a decimal comma, or one between thousands; {as_meant(cell)}")
+    if isinstance(cell, str) and has_unit(cell):
+        raise InputError(where, cell, f"a number alone is allowed: its unit stands in the header, as in {_example(header)}")
+    if isinstance(cell, str) and row <= 3 and re.fullmatch(r"[\[(]?[^\W\d_][\w/^]{0,9}[\])]?", cell.strip()):
+        allowed = f"a number is allowed; if these are units, write each behind the name of its column, as in {_example(header)}"
+        raise InputError(where, cell, allowed)
     if cell is None or (isinstance(cell, str) and not cell.strip()):
         raise InputError(where, cell, "nothing was measured there; leave the row out")
     raise InputError(where, cell, "a finite number is allowed; leave the row out where nothing was measured")

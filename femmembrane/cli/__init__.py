@@ -17,7 +17,8 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import InputError
-from . import completion, convergence, cost, explore, export, fit, report, run, scenes, sweep, view
+from . import completion, convergence, cost, explore, export, fit, report, run, scenes, sweep, switch, view
+from .interrupts import ignore_further
 from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, drop, fail, no_room, open_streams
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "NOT_CONVERGED", "NOT_WRITTEN", "app", "main"]
@@ -34,6 +35,7 @@ app = App(
 for command in (
     run.run,
     sweep.sweep,
+    switch.switch,
     convergence.convergence,
     cost.cost,
     fit.fit,
@@ -56,6 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         The words after ``femmembrane``; those of the process by default.
     """
+    code = _answer(arguments)
+    if code == INTERRUPTED and arguments is None:
+        ignore_further()
+    return code
+
+
+def _answer(arguments: Sequence[str] | None) -> int:
+    """The exit code of a command; whatever goes wrong is said."""
     open_streams()
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files; the backend of a notebook need not exist here
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # the place of its list of fonts is not worth a message

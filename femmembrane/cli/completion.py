@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from ..errors import InputError
-from .outcome import DONE, say
+from .outcome import succeed
 
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 
@@ -26,5 +26,4 @@ def install_completion(*, shell: Shell | None = None) -> int:
         script = app.install_completion(shell=shell or detect_shell())
     except ShellDetectionError:
         raise InputError("--shell", None, "the shell was not recognised; bash, zsh, fish and powershell are allowed") from None
-    say(f"written: {script}\nA new shell completes femmembrane.\n")
-    return DONE
+    return succeed("", [script], hint="A new shell completes femmembrane.")

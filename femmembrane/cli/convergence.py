@@ -7,10 +7,19 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused, say
+from .outcome import BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, Table, count, explain, fail, not_written, refused, succeed
 
 
-def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: str = "1,2,3,4", elements: str = "8,16,32,64") -> int:
+def convergence(
+    scene: Path,
+    /,
+    *,
+    out: Path,
+    changes: Changes = None,
+    degrees: str = "1,2,3,4",
+    elements: str = "8,16,32,64",
+    table: Table = False,
+) -> int:
     """Solve the last equilibrium that a scene file asks for on many meshes, and write convergence.csv and convergence.png to a folder.
 
     Exit codes: 0 done, 2 bad input, 3 not converged (on some meshes: they are left out; on its own: nothing is written), 4 results
@@ -48,8 +57,7 @@ def convergence(scene: Path, /, *, out: Path, changes: Changes = None, degrees: 
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if study.messages:
         return fail(NOT_CONVERGED, f"{'; '.join(study.messages)}. The other meshes are in {out}")
-    say("\n".join([str(study), "written:", *(f"  {path}" for path in written)]) + "\n")
-    return DONE
+    return succeed(count(study.unknowns.size, "mesh", "meshes"), written, table=str(study), asked=table)
 
 
 def _numbers(option: str, text: str, most: int | None = None) -> tuple[int, ...]:

@@ -7,10 +7,10 @@ from pathlib import Path
 from ..errors import InputError, SolveError
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused, say
+from .outcome import BAD_INPUT, NOT_CONVERGED, NOT_WRITTEN, Table, count, explain, fail, not_written, refused, succeed
 
 
-def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False) -> int:
+def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = False, table: Table = False) -> int:
     """Measure error against time of the last equilibrium that a scene file asks for, by every method on every mesh.
 
     Writes cost.csv and cost.png. Exit codes: 0 done, 2 bad input, 3 not converged, 4 results could not be written, 130 interrupted. Only
@@ -41,5 +41,9 @@ def cost(scene: Path, /, *, out: Path, changes: Changes = None, quick: bool = Fa
             study.plot(out / "cost.png")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
-    say(f"{study}\n")
-    return DONE
+    return succeed(
+        count(len(study.select(what="solve")), "timed solve", "timed solves"),
+        [out / "cost.csv", out / "cost.png"],
+        table=str(study),
+        asked=table,
+    )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .folders import Changes, OwnScene, System, finished, own_of, read, units_of
-from .outcome import DONE, say, written_in_words
+from .outcome import succeed
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -49,9 +49,7 @@ def explore(
         return serve(read(source, changes), host=host, port=port, units=units_of(source, changes, units))
     if changes:
         raise InputError("--set", changes[0], "allowed with --live only: a finished run has its scene")
-    page = write(source, out, units or "scaled", own_of(own))
-    say(written_in_words("", [page]))
-    return DONE
+    return succeed("", [write(source, out, units or "scaled", own_of(own))])
 
 
 def write(folder: Path, out: Path | None = None, units: str = "scaled", own: Scene | None = None) -> Path:

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from ..errors import InputError, SolveError, Status
 from .folders import Changes, read, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, explain, fail, not_written, refused, say
+from .outcome import BAD_INPUT, DONE, NOT_CONVERGED, NOT_WRITTEN, Table, explain, fail, not_written, refused, succeed
 
 _FILES = ("fitted.toml", "fit.csv", "residuals.csv", "fit.png", "report.html")
 
@@ -27,6 +27,7 @@ def fit(
     intervals: Literal["auto", "linear", "profile"] = "auto",
     compare: bool = False,
     changes: Changes = None,
+    table: Table = False,
 ) -> int:
     """Fit numbers of a scene file to measured tests, and write them with their intervals, a scene file, a figure and a page.
 
@@ -64,8 +65,8 @@ def fit(
     deviations = _noise(noise or [])
     tests = []
     for entry in data:
-        own, mark, table = entry.partition("=")
-        tests.append(LabTest(table, scene=read(Path(own), needs_run=False)) if mark else LabTest(entry))
+        own, mark, path = entry.partition("=")
+        tests.append(LabTest(path, scene=read(Path(own), needs_run=False)) if mark else LabTest(entry))
     names = (*_FILES, "models.csv") if compare else _FILES
     with working(out, names), Interrupts() as interrupts:
         try:
@@ -85,8 +86,8 @@ def fit(
                 models.write_csv(out / "models.csv")
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
-    told = [str(found), *([str(models)] if models is not None else []), "written:", *(f"  {out / name}" for name in names)]
-    say("\n".join(told) + "\n")
+    tables = "\n".join([str(found), *([str(models)] if models is not None else [])])
+    succeed(found.summary, [out / name for name in names], table=tables, asked=table)
     if found.status is not Status.CONVERGED:
         return fail(NOT_CONVERGED, f"{'; '.join(found.notes)}. What suits the data best so far is in {out}")
     return DONE

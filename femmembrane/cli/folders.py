@@ -14,6 +14,7 @@ from .scenes import bundled
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
+    from ..results.tipped import TippedBranch
     from ..scene import Scene
 
 #: --units of the commands that draw
@@ -140,6 +141,23 @@ def _remove_empty(folders: Iterable[Path]) -> None:
 
 
 def finished(folder: Path, facts: Mapping[str, Any] | None = None, own: Scene | None = None) -> Branch:
+    """The axisymmetric branch that a run left in a folder, or that was saved to a file; arguments are those of :func:`finished_any`.
+
+    Raises
+    ------
+    InputError
+        Also for a branch of states with waves around the axis.
+    """
+    from ..results.tipped import TippedBranch
+
+    branch = finished_any(folder, facts, own)
+    if not isinstance(branch, TippedBranch):
+        return branch
+    allowed = "an axisymmetric branch is allowed here; of states with waves there are femmembrane view and export --to pvd or csv"
+    raise InputError("folder", str(folder), allowed)
+
+
+def finished_any(folder: Path, facts: Mapping[str, Any] | None = None, own: Scene | None = None) -> Branch | TippedBranch:
     """The branch that a run left in a folder, or that was saved to a file.
 
     Parameters
@@ -159,11 +177,12 @@ def finished(folder: Path, facts: Mapping[str, Any] | None = None, own: Scene | 
     require_libraries()
     from ..results.output import refuse_other_branch
     from ..results.store import load
+    from ..results.tipped import TippedBranch
 
     file = folder / "branch.nc" if folder.is_dir() else folder
     if not file.is_file():
         raise InputError("folder", str(folder), "the folder of a run (with its branch.nc) or a saved branch (.nc) is allowed")
-    branch = load(file, scene=own)
-    if facts:
+    branch: Branch | TippedBranch = load(file, scene=own)
+    if facts and not isinstance(branch, TippedBranch):
         refuse_other_branch(branch, facts, folder)
     return branch

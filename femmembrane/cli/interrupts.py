@@ -15,11 +15,13 @@ class Interrupts:
 
     Compiled solvers may swallow the exception that an interrupt raises, so it is also noted, and raised again at the next :meth:`check`.
     While ``hold`` is set the first interrupt is only noted, so that a step is finished, or the results are. A second one gets through.
+    Once ``over`` is set none does: the command only says how it ended.
     """
 
     def __init__(self) -> None:
         self.caught = False
         self.hold = False
+        self.over = False
         self._previous: Any = None
 
     def __enter__(self) -> Self:
@@ -38,7 +40,15 @@ class Interrupts:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         first, self.caught = not self.caught, True
+        if self.over:
+            return
         if not (first and self.hold):
             raise KeyboardInterrupt
         with suppress(OSError):  # of the system alone: a handler may run in the middle of a write
             os.write(2, b"femmembrane: interrupted; what is being computed or written is finished first; Ctrl-C again drops it\n")
+
+
+def ignore_further() -> None:
+    """From now on Ctrl-C does nothing: the process ends by itself, and would only print where it was interrupted."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

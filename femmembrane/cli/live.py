@@ -135,7 +135,7 @@ class Session:
 
 def make_server(session: Session, host: str = LOOPBACK, port: int = 0) -> ThreadingHTTPServer:
     """A server that answers the questions of a page, under an address that nobody can guess."""
-    server = ThreadingHTTPServer((host, port), _Handler)
+    server = _Server((host, port), _Handler)
     server.daemon_threads = True
     server.session, server.word = session, secrets.token_urlsafe(16)  # type: ignore[attr-defined]
     return server
@@ -149,6 +149,13 @@ def address(server: ThreadingHTTPServer) -> str:
 def _place(server: Any) -> str:
     host, port = server.server_address[:2]
     return f"{host}:{port}"
+
+
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A page that is closed does not wait for its answer: nothing is wrong."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

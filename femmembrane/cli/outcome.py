@@ -7,7 +7,9 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Annotated, TextIO
+
+from cyclopts import Parameter
 
 from ..errors import InputError, NotWrittenError, Status, printable
 
@@ -35,11 +37,37 @@ def say(text: str) -> None:
     _write(sys.stdout, text)
 
 
-def written_in_words(head: str, written: Sequence[Path]) -> str:
-    """What was computed and written: a line for each file on a terminal, one line in a pipe."""
-    if sys.stdout.isatty():
-        return "\n".join([f"{head}written:", *(f"  {path}" for path in written)]) + "\n"
-    return " ".join([f"{head}written:", *map(str, written)]) + "\n"
+#: --table of the commands that have a table
+Table = Annotated[bool, Parameter(name="--table", negative=(), help="Print the table in a pipe as well; on a terminal it always is.")]
+
+
+def succeed(head: str, written: Sequence[Path], *, table: str = "", asked: bool = False, hint: str = "") -> int:
+    """Say what was computed and written, on standard output: one line in a pipe. A terminal also gets the table, and a line for each file.
+
+    Parameters
+    ----------
+    head
+        What was computed, in a few words.
+    written
+        The files.
+    table
+        What was found, on lines of its own.
+    asked
+        Whether the table is printed in a pipe too.
+    hint
+        What to do next, for a terminal.
+    """
+    terminal = sys.stdout.isatty()
+    head = ", ".join(filter(None, [head, "written:"]))
+    if table and (terminal or asked):
+        say(f"{table}\n")
+    if terminal:
+        say("\n".join([head, *(f"  {path}" for path in written)]) + "\n")
+    else:
+        say(" ".join([head, *map(str, written)]) + "\n")
+    if hint and terminal:
+        say(f"{hint}\n")
+    return DONE
 
 
 def _write(stream: TextIO, text: str) -> None:
@@ -94,8 +122,8 @@ def explain(status: Status, message: str) -> str:
     return what if status.advice.lower() in what.lower() else f"{what.rstrip('.')}; {status.advice}"
 
 
-def count(number: int) -> str:
-    return f"{number} equilibrium" if number == 1 else f"{number} equilibria"
+def count(number: int, one: str = "equilibrium", many: str = "equilibria") -> str:
+    return f"{number} {one if number == 1 else many}"
 
 
 def not_written(error: Exception, out: Path) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Status
 from .folders import OwnScene, System, finished, own_of
-from .outcome import DONE, say, written_in_words
+from .outcome import succeed
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
@@ -28,9 +28,7 @@ def report(folder: Path, /, *, out: Path | None = None, units: System = "scaled"
     units
         Of figures and ranges: those of the package, or SI units by the [scales] of the scene.
     """
-    page = write(folder, out, units, own_of(own))
-    say(written_in_words("", [page]))
-    return DONE
+    return succeed("", [write(folder, out, units, own_of(own))])
 
 
 def write(folder: Path, out: Path | None = None, units: str = "scaled", own: Scene | None = None) -> Path:

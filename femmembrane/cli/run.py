@@ -24,8 +24,7 @@ from .outcome import (
     fail,
     not_written,
     refused,
-    say,
-    written_in_words,
+    succeed,
 )
 from .progress import observer
 from .report import write as write_report
@@ -75,13 +74,13 @@ def run(
     from ..quantities import Units
     from ..results.checkpoint import NAME, Checkpoints, same_scene, unfinished
     from ..results.output import SURFACES_FOLDER, run_files
-    from ..scene.absurd_loads import remarks_on_loads
+    from ..scene.absurd_loads import remarks_on_direction, remarks_on_loads, remarks_on_scales
 
     system = units_of(scene, changes, units)
     Units.of(system, asked.converter)
     if explore:
         check_explorer()
-    for remark in remarks_on_loads(asked):
+    for remark in (*remarks_on_scales(asked.scales), *remarks_on_loads(asked), *remarks_on_direction(asked)):
         fail(DONE, remark)
 
     with working(out, (*run_files(), NAME), (SURFACES_FOLDER,)), Interrupts() as interrupts:
@@ -107,6 +106,7 @@ def run(
             if explore and len(branch):
                 written.append(write_explorer(out, units=system, own=asked))
         except KeyboardInterrupt:  # the second one
+            interrupts.over = True
             checkpoints.save()
             return fail(INTERRUPTED, f"interrupted while results were written to {out}: some are missing; --resume writes them")
         except (InputError, OSError) as error:
@@ -118,8 +118,7 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    say(written_in_words(f"{count(len(branch))}, ", written))
-    return DONE
+    return succeed(count(len(branch)), written)
 
 
 def _ended(scene: Scene, out: Path) -> int | None:

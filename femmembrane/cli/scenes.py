@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from ..errors import InputError
-from .outcome import DONE, say
+from .outcome import DONE, say, succeed
 
 #: the source tree, if the package is run from one: its scenes are among the demos
 _TREE = Path(__file__).parents[2]
@@ -89,8 +89,7 @@ def new(name: str, /) -> int:
     except (OSError, ValueError) as error:
         reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
         raise InputError("name", name, f"{path} cannot be written ({reason})") from None
-    say(f"written: {path}\nNext: femmembrane run {path} --out out\n")
-    return DONE
+    return succeed("", [path], hint=f"Next: femmembrane run {path} --out out")
 
 
 def bundled() -> dict[str, Path]:

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ..errors import InputError
 from .folders import Changes, System, read, tables_of, units_of, working
 from .interrupts import Interrupts
-from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, fail, not_written, refused, say
+from .outcome import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, NOT_WRITTEN, Table, fail, not_written, refused, say, succeed
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -34,6 +34,7 @@ def sweep(
     scheduler: str | None = None,
     dry_run: bool = False,
     units: System | None = None,
+    table: Table = False,
 ) -> int:
     """Compute one quantity of every scene of a grid, and write sweep.nc and a map, sweep.png, to a folder.
 
@@ -113,6 +114,7 @@ def sweep(
                 return fail(NOT_WRITTEN, f"{not_written(error, out)}. {done[0]} of {done[1]} scenes were done")
             raise
         except KeyboardInterrupt:
+            interrupts.over = True
             return fail(INTERRUPTED, f"interrupted. {done[0]} of {done[1]} scenes are kept in {out}: the same command goes on from there")
         interrupts.hold = True
         results = found.failed < len(found)
@@ -125,8 +127,7 @@ def sweep(
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if not results:
         return fail(NOT_CONVERGED, f"no scene has a result; the reasons are in {written[0]}")
-    say("\n".join([str(found), "written:", *(f"  {path}" for path in written)]) + "\n")
-    return DONE
+    return succeed(found.summary, written, table=str(found), asked=table)
 
 
 class _NoScenes:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import SolveError
-from .folders import OwnScene, System, finished, own_of
-from .outcome import DONE, NOT_CONVERGED, explain, fail
+from .folders import OwnScene, System, finished_any, own_of
+from .outcome import DONE, NOT_CONVERGED, explain, fail, succeed
 
 
 def view(
@@ -47,10 +47,11 @@ def view(
 
     for file in filter(None, (screenshot, movie)):
         remove_leftovers(file.parent)
-    branch = finished(folder, own=own_of(own))
+    branch = finished_any(folder, own=own_of(own))
     try:
         with counter("frames") as count:
             show(branch, color=color, step=step, mode=mode, screenshot=screenshot, movie=movie, units=units, on_frame=count)
     except SolveError as error:
         return fail(NOT_CONVERGED, explain(error.status, str(error)))
-    return DONE
+    written = list(filter(None, (screenshot, movie)))
+    return succeed("", written) if written else DONE

@@ -5,6 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#if defined(_MSC_VER) && !defined(__clang__)
+#define restrict __restrict /* the keyword of C99 under the name that MSVC has for it */
+#endif
+
 /* how much larger than the diagonal entry the terms that make up a pivot may be, and beside them a pivot with a certain sign */
 #define GROWTH 100.0
 #define SMALLEST 1e-11

@@ -336,6 +336,34 @@ EACH_PROCESSOR static void form_parts(const Elements *s, const double *stiffness
     }
 }
 
+/* Jumps of the slope of the deformed meridian where elements meet, over the smaller side, and at the poles: `poles` 1 for that at the first
+   end, 2 for that at the last. The arrays of both ends of the elements have the components along first: (along 0, along 1, up 0, up 1). */
+static void kinks(const Elements *s, const double *x, const double *at_rest, const double *slopes, const double *per_length, int poles, double *jumps)
+{
+    const Py_ssize_t ne = s->n_elements, inner = ne - 1;
+    const int m = s->n_local;
+    double along = 0.0, up = 0.0, size = 0.0; /* at the end of the element before */
+    for (Py_ssize_t e = 0; e < ne; e++) {
+        const int32_t *u = s->gather + 2 * m * e, *w = u + m;
+        double y[4] = {0.0, 0.0, 0.0, 0.0};
+        for (int k = 0; k < m; k++) {
+            const double first = slopes[k], last = slopes[2 * m + k];
+            const double a = u[k] < s->n_free ? x[u[k]] : 0.0, b = w[k] < s->n_free ? x[w[k]] : 0.0;
+            y[0] += first * a, y[1] += last * a, y[2] += first * b, y[3] += last * b;
+        }
+        for (int i = 0; i < 4; i++)
+            y[i] = y[i] * per_length[i * ne + e] + at_rest[i * ne + e];
+        const double before = sqrt(y[0] * y[0] + y[2] * y[2]) + 1e-300, along_jump = along - y[0], up_jump = up - y[2];
+        if (e > 0)
+            jumps[e - 1] = sqrt(along_jump * along_jump + up_jump * up_jump) / (size < before ? size : before);
+        else if (poles & 1)
+            jumps[inner] = 2.0 * fabs(y[2]) / before;
+        along = y[1], up = y[3], size = sqrt(along * along + up * up) + 1e-300;
+    }
+    if (poles & 2)
+        jumps[inner + (poles & 1)] = 2.0 * fabs(up) / size;
+}
+
 /* ---- Python --------------------------------------------------------------------------------------------------------------------- */
 
 static void elements_dealloc(PyObject *self)
@@ -578,6 +606,27 @@ static PyObject *elements_form_parts(PyObject *self, PyObject *args)
     return bad ? NULL : Py_BuildValue("(dd)", parts[0], parts[1]);
 }
 
+/* kinks(x, at rest, slopes, per length, poles, jumps) */
+static PyObject *elements_kinks(PyObject *self, PyObject *args)
+{
+    const Elements *s = (Elements *)self;
+    const Py_ssize_t ne = s->n_elements;
+    PyObject *o[5];
+    Py_buffer x = {0}, r = {0}, d = {0}, l = {0}, j = {0};
+    int poles;
+    if (!PyArg_ParseTuple(args, "OOOOiO", &o[0], &o[1], &o[2], &o[3], &poles, &o[4]))
+        return NULL;
+    const int bad = take_array(o[0], &x, 'd', s->n_free, 0, "x") < 0 || take_array(o[1], &r, 'd', 4 * ne, 0, "at rest") < 0 ||
+                    take_array(o[2], &d, 'd', 8 * s->n_local, 0, "slopes") < 0 || take_array(o[3], &l, 'd', 4 * ne, 0, "per length") < 0 ||
+                    take_array(o[4], &j, 'd', ne - 1 + (poles & 1) + (poles >> 1 & 1), 1, "jumps") < 0;
+    if (!bad)
+        kinks(s, x.buf, r.buf, d.buf, l.buf, poles, j.buf);
+    PyBuffer_Release(&x), PyBuffer_Release(&r), PyBuffer_Release(&d), PyBuffer_Release(&l), PyBuffer_Release(&j);
+    if (bad)
+        return NULL;
+    Py_RETURN_NONE;
+}
+
 /* a new object with the factors of [K, -V'; row, corner], or NULL with an exception set */
 static BorderObject *new_border(const Elements *s, const double *densities, const double *volume_gradient, const double *row, double corner)
 {
@@ -639,6 +688,7 @@ static PyMethodDef elements_methods[] = {{"at_quadrature", elements_at_quadratur
                                          {"largest", elements_largest, METH_O, NULL},
                                          {"force_scale", elements_force_scale, METH_VARARGS, NULL},
                                          {"form_parts", elements_form_parts, METH_VARARGS, NULL},
+                                         {"kinks", elements_kinks, METH_VARARGS, NULL},
                                          {"border", elements_border, METH_VARARGS, NULL},
                                          {"step", elements_step, METH_VARARGS, NULL},
                                          {NULL, NULL, 0, NULL}};

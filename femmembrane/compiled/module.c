@@ -37,7 +37,7 @@ PyMODINIT_FUNC PyInit__native(void)
 {
     PyObject *module = PyModule_Create(&definition), *operations = tape_operations();
     if (module == NULL || operations == NULL || PyModule_AddObjectRef(module, "OPERATIONS", operations) < 0 ||
-        PyModule_AddIntConstant(module, "INTERFACE", 5) < 0 || /* raised here and in kernels/compiled_kernels.py when arguments or answers change */
+        PyModule_AddIntConstant(module, "INTERFACE", 6) < 0 || /* raised here and in kernels/compiled_kernels.py when arguments or answers change */
         add_type(module, &factor_spec, "Factor", &types.factor) < 0 || add_type(module, &border_spec, "Border", &types.border) < 0 ||
         add_type(module, &elements_spec, "Elements", &types.elements) < 0)
         Py_CLEAR(module);

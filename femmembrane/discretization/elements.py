@@ -82,6 +82,14 @@ def second_derivatives(degree: int, xi: Array) -> Array:
     return np.asarray(np.polynomial.legendre.legval(2 * np.asarray(xi) - 1, 2 * np.polynomial.legendre.legder(series)).T)
 
 
+@lru_cache(maxsize=32)
+def gauss_points(count: int) -> Array:
+    """Gauss points on [0, 1]; read-only."""
+    points: Array = (np.polynomial.legendre.leggauss(count)[0] + 1) / 2
+    points.setflags(write=False)
+    return points
+
+
 def lobatto(degree: int) -> Array:
     """Chebyshev-Lobatto points on [0, 1], ends included."""
     return (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2

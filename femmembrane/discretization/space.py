@@ -20,7 +20,7 @@ from scipy import sparse
 
 from ..physics.magnetisation import seen_by
 from ..threads import cached_property
-from .elements import lagrange, lobatto, second_derivatives, shape_functions
+from .elements import gauss_points, lagrange, lobatto, second_derivatives, shape_functions
 from .lift import Lift
 from .meridian import Array, Meridian
 from .numbering import Numbering
@@ -113,12 +113,17 @@ class Space(Numbering):
         value, slope = shape_functions(self.degree, xi)
         if not self.nodal:
             return value, slope
-        at_nodes = np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0])
-        return value @ at_nodes, slope @ at_nodes
+        return value @ self._at_nodes, slope @ self._at_nodes
 
     def second_derivatives(self, xi: Array) -> Array:
         """Second derivatives of the shape functions at points xi of the reference element, shape (len(xi), degree + 1)."""
-        return second_derivatives(self.degree, xi)
+        second = second_derivatives(self.degree, xi)
+        return second @ self._at_nodes if self.nodal else second
+
+    @property
+    def _at_nodes(self) -> Array:
+        """Coefficients of the hierarchical functions in those that are 1 at one node."""
+        return np.asarray(np.linalg.inv(shape_functions(self.degree, lobatto(self.degree))[0]))
 
     def center_height(self, x: Array) -> float:
         """Height of the first point of the meridian, the pole of a disc."""
@@ -310,7 +315,7 @@ class Space(Numbering):
         ndarray, shape (n_elements - 1 + number of poles,)
             At the reference radii :attr:`kink_radii`.
         """
-        at_rest, slopes, per_length, rest_kinks, poles = self._ends_of_elements
+        at_rest, slopes, per_length, rest_kinks, poles = self.ends_of_elements
         y = slopes @ self.extend(x).take(self.gather)
         y *= per_length
         y += at_rest
@@ -335,7 +340,7 @@ class Space(Numbering):
         return np.append(self._end_positions[0, 1:-1], np.zeros(int(self.on_axis.sum())))
 
     @cached_property
-    def _ends_of_elements(self) -> tuple[Array, Array, Array, Array, list[tuple[int, int]]]:
+    def ends_of_elements(self) -> tuple[Array, Array, Array, Array, list[tuple[int, int]]]:
         """Components along and up of the tangents at both ends of each element at rest, each of shape (2, n_elements), slopes of the shape
         functions there, the factor that relates them to arc length, the kinks at rest and which ends are poles."""
         inside = 1e-9 * self.sizes  # the tangent of a curve with a corner has two values there
@@ -364,7 +369,7 @@ class Space(Numbering):
         if self.n_elements == 1 or self.degree > _RECOVERED:
             _, u_s, _, w_s = self.displacement(x, s)
             return u_s, w_s
-        gauss = (np.polynomial.legendre.leggauss(self.degree)[0] + 1) / 2
+        gauss = gauss_points(self.degree)
         ends, size = self.ends, self.sizes
         n_local = self.degree + 1
         slope = self.shape_functions(gauss)[1]

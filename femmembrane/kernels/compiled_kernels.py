@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..discretization.space import Space
-from .interface import N_DENSITIES, Array, Elements, Pencil, PointFunction, Rayleigh, Step, Tape
+from .interface import N_DENSITIES, Answer, Array, Elements, Pencil, PointFunction, Rayleigh, Step, Tape
 from .numpy_kernels import NumpyKernels
 
 if TYPE_CHECKING:
     from .. import _native
 
 #: version of the interface, as the sources in ``compiled/`` state it; raised there and here when arguments or answers change
-INTERFACE = 5
+INTERFACE = 6
 
 
 class CompiledKernels:
@@ -57,8 +57,9 @@ class CompiledKernels:
         return y
 
     def inner(self, band: Array, half_bandwidth: int, x: Array, y: Array) -> float:
-        columns = np.ascontiguousarray(band.T)
-        return float(self.module.inner(columns, len(x), half_bandwidth, np.ascontiguousarray(x), np.ascontiguousarray(y)))
+        x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
+        own: float = self.module.inner(np.ascontiguousarray(band.T), len(x), half_bandwidth, x, y)
+        return own
 
     def inertia(self, band: Array, half_bandwidth: int, constraint: Array | None, compliance: float) -> int:
         """The pivots of an L D L^T without pivoting are counted where their signs are beyond doubt."""
@@ -69,9 +70,8 @@ class CompiledKernels:
         if not pencil.banded:
             return self._otherwise.rayleigh(pencil, guess, tolerances)
         mode = np.array(guess, dtype=float)
-        band, mass, t = np.ascontiguousarray(pencil.band.T), np.ascontiguousarray(pencil.mass.T), tolerances
-        limits = t.iterations, t.converged, t.shrinking, t.rounding, t.gap, t.noise, t.floor
-        answer = self.module.rayleigh(band, mass, pencil.constraint, len(mode), pencil.kd, pencil.compliance, mode, *limits)
+        band, mass = np.ascontiguousarray(pencil.band.T), np.ascontiguousarray(pencil.mass.T)
+        answer = self.module.rayleigh(band, mass, pencil.constraint, len(mode), pencil.kd, pencil.compliance, mode, *tolerances)
         if answer is None:
             return None
         value, error, below = answer  # below is negative where the signs of pivots are in doubt
@@ -90,7 +90,8 @@ class CompiledElements:
         table, gather = np.ascontiguousarray(space.table), np.ascontiguousarray(space.gather)
         own = module.Elements(tape, data, gather, table, field, space.n_quadrature, n_local, space.half_bandwidth)
         self.native: _native.Elements = own
-        self._n_free, self._n_points, self._depth = space.n_free, data.shape[1], 3 * space.half_bandwidth + 1
+        self._n_free, self._depth = space.n_free, 3 * space.half_bandwidth + 1
+        self._forces, self._densities = (3, space.n_free), (N_DENSITIES, data.shape[1])
         self._shape = 4 * space.n_quadrature, space.n_elements
         self.largest, self.force_scale, self.form_parts = own.largest, own.force_scale, own.form_parts
 
@@ -99,10 +100,19 @@ class CompiledElements:
         self.native.at_quadrature(x, local)
         return local
 
-    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> tuple[float, float, float, bool, Array, Array]:
-        forces, densities = np.empty((3, self._n_free)), np.empty((N_DENSITIES, self._n_points))
+    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> Answer:
+        forces, densities = np.empty(self._forces), np.empty(self._densities)
         elastic, magnetic, volume, finite = self.native.evaluate(x, pressure, factor, forces, densities)
         return elastic, magnetic, volume, finite, forces, densities
+
+    def kinks(self, space: Space, x: Array) -> Array:
+        if space.breaks:
+            return space.kinks(x)
+        at_rest, slopes, per_length, rest_kinks, poles = space.ends_of_elements
+        jumps = np.empty(rest_kinks.size)
+        self.native.kinks(x, at_rest, slopes, per_length, sum(1 << k for k, _ in poles), jumps)
+        jumps -= rest_kinks
+        return jumps
 
     def assemble(self, densities: Array) -> Array:
         band = np.zeros((self._n_free, self._depth))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +46,8 @@ class Border(Protocol):
     def solve(self, f: Array, g: float) -> tuple[Array, float]: ...
 
 
+#: elastic and magnetic energy, volume, whether all derivatives are numbers, forces and densities: see :meth:`Elements.evaluate`
+Answer = tuple[float, float, float, bool, Array, Array]
 #: factors, corrections of x and of P, sizes of the former and of x
 Step = tuple[Border, Array, float, tuple[float, float], tuple[float, float]]
 
@@ -60,7 +61,7 @@ class Elements(Protocol):
     def at_quadrature(self, x: Array) -> Array:
         """(u, u_x, w, w_x) at the quadrature points, shape (4 n_quadrature, n_elements)."""
 
-    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> tuple[float, float, float, bool, Array, Array]:
+    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> Answer:
         """Elastic and magnetic energy, volume, whether all derivatives are numbers, the forces, and the densities. ``more`` are further
         parameters of the point function, if it has any.
 
@@ -100,6 +101,9 @@ class Elements(Protocol):
     def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
         """Sum of the absolute forces that meet at the nodes, largest for u and for w, from the densities of an evaluation."""
 
+    def kinks(self, space: Space, x: Array) -> Array:
+        """:meth:`.Space.kinks` of a space with these elements, whose ends may be held elsewhere."""
+
     def form_parts(self, densities: Array, x: Array, weights: Array) -> tuple[float, float]:
         """Of the integrand of x . K x, K as assembled by :meth:`assemble`, at the quadrature points.
 
@@ -112,8 +116,7 @@ class Elements(Protocol):
         """
 
 
-@dataclass(frozen=True)
-class Rayleigh:
+class Rayleigh(NamedTuple):
     """Tolerances of Rayleigh quotient iterations.
 
     Attributes
@@ -173,7 +176,7 @@ class Kernels(Protocol):
         """Symmetric band matrix in LAPACK general storage times a vector."""
 
     def inner(self, band: Array, half_bandwidth: int, x: Array, y: Array) -> float:
-        """x . A y with a symmetric band matrix in LAPACK general storage."""
+        """x . A y with a symmetric band matrix in LAPACK general storage and contiguous vectors."""
 
     def inertia(self, band: Array, half_bandwidth: int, constraint: Array | None, compliance: float) -> int:
         """See :func:`..solve.banded.negative_directions`."""

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 
 from ..discretization.space import HESSIAN_PAIRS, Space
 from .bordered import BorderedFactor
-from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Array, Border, Pencil, PointFunction, Rayleigh, Step
+from .interface import N_FORCE, N_STIFFNESS, N_SUMS, Answer, Array, Border, Pencil, PointFunction, Rayleigh, Step
 
 
 class NumpyKernels:
@@ -56,7 +56,7 @@ class NumpyElements:
     def at_quadrature(self, x: Array) -> Array:
         return self._space.at_quadrature(x)
 
-    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> tuple[float, float, float, bool, Array, Array]:
+    def evaluate(self, x: Array, pressure: float, factor: float, *more: float) -> Answer:
         out = self._point.replay(self._space.at_quadrature(x), np.array([pressure, factor, *more]))
         densities = out[N_SUMS:]
         with np.errstate(invalid="ignore", over="ignore"):  # outside the domain of the energy the answer is NaN, which the caller judges
@@ -86,6 +86,9 @@ class NumpyElements:
     def force_scale(self, densities: Array, pressure: float) -> tuple[float, float]:
         density = np.abs(densities[:N_FORCE]).reshape(self._force_shape)
         return self.largest(self._space.assemble_magnitude(density[0] + abs(pressure) * density[1]))
+
+    def kinks(self, space: Space, x: Array) -> Array:
+        return space.kinks(x)
 
     def form_parts(self, densities: Array, x: Array, weights: Array) -> tuple[float, float]:
         shape = self._space.s.shape

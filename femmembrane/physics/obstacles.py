@@ -12,6 +12,7 @@ A body is a class here that answers :meth:`Obstacle.pieces`, and a line in the r
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from os import PathLike
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import choice, convert, is_number, number, store
 from ..errors import InputError
@@ -95,12 +97,9 @@ class Obstacle:
         return self
 
     @cached_property
-    def _table(self) -> tuple[Array, Array, list[Straight], list[Arc]]:
-        straight = [piece for piece in self.pieces() if isinstance(piece, Straight)]
-        arcs = [piece for piece in self.pieces() if isinstance(piece, Arc)]
-        a = np.array([[*p.start, *p.along, *p.normal, p.low, p.high] for p in straight]).reshape(-1, 8)
-        b = np.array([[*p.center, p.radius, *p.middle, p.cosine, p.side] for p in arcs]).reshape(-1, 7)
-        return a, b, straight, arcs
+    def table(self) -> tuple[Array, Array]:
+        """The numbers of the straight pieces, shape (m, 8), and of the arcs, shape (k, 7), as :func:`rows_of` lists them."""
+        return rows_of(self.pieces())
 
     def touch(self, rho: Any, eta: Any) -> Touch:
         """Gap and its derivatives at points.
@@ -110,8 +109,47 @@ class Obstacle:
         rho, eta : ndarray
             Positions over R0.
         """
-        rho, eta = np.atleast_1d(np.asarray(rho, dtype=float)), np.atleast_1d(np.asarray(eta, dtype=float))
-        straight, arcs, _, _ = self._table
+        return self._touch(*_points(rho, eta))[0]
+
+    def drift(self, rho: Any, eta: Any, rates: tuple[Array, Array]) -> Array:
+        """How gap and normal at points change while the body does.
+
+        Parameters
+        ----------
+        rho, eta : ndarray
+            Positions over R0, which stay.
+        rates : (ndarray, ndarray)
+            Rates of change of :attr:`table`.
+
+        Returns
+        -------
+        ndarray, shape (3, n)
+            Rates of the gap, and of the normal along rho and along z.
+        """
+        rho, eta = _points(rho, eta)
+        (straight, arcs), m = self.table, len(self.table[0])
+        nearest = self._touch(rho, eta)[1]
+        found, flat = np.empty((3, rho.size)), nearest < m
+        at = nearest[flat]
+        (a, v), (a_rate, v_rate) = ((rows[at, 0:2], rows[at, 4:6]) for rows in (straight, rates[0]))
+        x = np.stack([rho[flat], eta[flat]], axis=1) - a
+        found[0, flat] = (v_rate * x).sum(axis=1) - (v * a_rate).sum(axis=1)
+        found[1:, flat] = v_rate.T
+        at = nearest[~flat] - m
+        center_rate, radius_rate, side = rates[1][at, 0:2], rates[1][at, 2], arcs[at, 6]
+        x = np.stack([rho[~flat], eta[~flat]], axis=1) - arcs[at, 0:2]
+        distance = np.hypot(*x.T)
+        away = np.divide(x, distance[:, None], out=np.zeros_like(x), where=distance[:, None] > 0)
+        along = (away * center_rate).sum(axis=1)
+        found[0, ~flat] = -side * (along + radius_rate)
+        found[1:, ~flat] = (side * np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0)) * (
+            away * along[:, None] - center_rate
+        ).T
+        return found
+
+    def _touch(self, rho: Array, eta: Array) -> tuple[Touch, NDArray[np.int64]]:
+        """:meth:`touch`, and which piece is the nearest."""
+        straight, arcs = self.table
         n, m, k = rho.size, len(straight), len(arcs)
         gap, far = np.empty((m + k, n)), np.empty((m + k, n))
         normal, curvature, size = np.empty((2, m + k, n)), np.zeros((m + k, n)), np.empty((m + k, n))
@@ -137,7 +175,7 @@ class Obstacle:
             curvature[m:] = side / safe
             size[m:] = np.abs(rho) + np.abs(eta) + np.abs(arcs[:, 0:1]) + np.abs(arcs[:, 1:2]) + radius
         best = far.argmin(axis=0), np.arange(n)
-        return Touch(gap[best], normal[0][best], normal[1][best], curvature[best], size[best])
+        return Touch(gap[best], normal[0][best], normal[1][best], curvature[best], size[best]), best[0]
 
     def gap(self, rho: Any, eta: Any) -> Array:
         """Signed distance of points from the body, negative inside it.
@@ -167,6 +205,23 @@ class Obstacle:
                 angle = middle + half * np.linspace(-1, 1, max(3, int(2 * half * _PER_RADIAN) + 1))
                 lines.append(np.array([piece.center[0] + piece.radius * np.cos(angle), piece.center[1] + piece.radius * np.sin(angle)]))
         return [line for line in lines if np.isfinite(line).all()]
+
+
+def rows_of(pieces: Iterable[Piece]) -> tuple[Array, Array]:
+    """The numbers of straight pieces (start, along, normal, low, high) and of arcs (center, radius, middle, cosine, side), one a row.
+
+    Parameters
+    ----------
+    pieces : iterable of Straight or Arc
+    """
+    known = list(pieces)
+    straight = [[*p.start, *p.along, *p.normal, p.low, p.high] for p in known if isinstance(p, Straight)]
+    arcs = [[*p.center, p.radius, *p.middle, p.cosine, p.side] for p in known if isinstance(p, Arc)]
+    return np.array(straight, dtype=float).reshape(-1, 8), np.array(arcs, dtype=float).reshape(-1, 7)
+
+
+def _points(rho: Any, eta: Any) -> tuple[Array, Array]:
+    return np.atleast_1d(np.asarray(rho, dtype=float)), np.atleast_1d(np.asarray(eta, dtype=float))
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,9 @@ def _unit(key: str, text: str, unit: str) -> tuple[Decimal, Dimension]:
             one = _PART.fullmatch(part)
             known = _symbol(one[1]) if one else None
             if one is None or known is None:
-                raise InputError(key, text, f"{part or unit!r} is no unit known here; {_known()} are known, with SI prefixes and powers")
+                near = _near(part)
+                hint = f"; write {near}" if near else f"; {_known()} are known, with SI prefixes and powers"
+                raise InputError(key, text, f"{part or unit!r} is no unit known here{hint}")
             power = int(one[2] or 1) * (-1 if place else 1)
             factor *= known[0] ** power
             dimension = _added(dimension, known[1], power)
@@ -152,6 +154,83 @@ def _symbol(text: str) -> tuple[Decimal, Dimension] | None:
         if text.endswith(symbol) and prefix in _PREFIXES:
             return Decimal(number).scaleb(_PREFIXES[prefix]), dimension
     return None
+
+
+#: how units are written that go by another name
+_OTHERWISE: Mapping[str, str] = {
+    "inch": "in",
+    "inches": "in",
+    "mil": "1e-3 in",
+    "thou": "1e-3 in",
+    "ft": "12 in",
+    "foot": "12 in",
+    "feet": "12 in",
+    "micron": "um",
+    "microns": "um",
+    "cc": "cm^3",
+    "ccm": "cm^3",
+    "torr": "mmHg",
+    "Torr": "mmHg",
+    "lbf": "4.44822 N",
+    "kgf": "9.80665 N",
+    "lb": "0.453592 kg",
+    "lbs": "0.453592 kg",
+    "oersted": "79.5775 A/m",
+    "Oe": "79.5775 A/m",
+    "gauss": "1e-4 T",
+    "Gauss": "1e-4 T",
+    "G": "1e-4 T, if it is a gauss",
+}
+#: names of symbols and prefixes, written out
+_NAMES = {
+    "gram": "g",
+    "meter": "m",
+    "metre": "m",
+    "second": "s",
+    "ampere": "A",
+    "newton": "N",
+    "pascal": "Pa",
+    "joule": "J",
+    "volt": "V",
+    "coulomb": "C",
+    "tesla": "T",
+    "liter": "l",
+    "litre": "l",
+}
+_PREFIX_NAMES = {
+    "": "",
+    "nano": "n",
+    "micro": "u",
+    "milli": "m",
+    "centi": "c",
+    "deci": "d",
+    "hecto": "h",
+    "kilo": "k",
+    "mega": "M",
+    "giga": "G",
+}
+
+
+def _near(part: str) -> str:
+    """How an unknown symbol would be written: out of its name or another spelling; empty if that is unknown."""
+    word, power = re.sub(r"^(\w*?)\^?(-?[1-9])?\.?$", r"\1", part), re.search(r"(?<=[^\W\d])\^?(-?[1-9])\.?$", part)
+    behind = f"^{power[1]}" if power else ""
+    if word in _OTHERWISE:
+        return _OTHERWISE[word]
+    if word and _symbol(word) is not None:
+        return word + behind
+    lowered = word.lower().removesuffix("s")
+    for name, prefix in _PREFIX_NAMES.items():
+        if lowered.startswith(name) and lowered.removeprefix(name) in _NAMES:
+            return prefix + _NAMES[lowered.removeprefix(name)] + behind
+    alike = [symbol for symbol in _spellings() if symbol.lower() == word.lower()]
+    return " or ".join(symbol + behind for symbol in alike[:3])
+
+
+def _spellings() -> list[str]:
+    """Symbols with the prefixes that they have in laboratories."""
+    prefixes = ("", "k", "M", "m", "u", "c")
+    return [*_WHOLE, *(prefix + symbol for symbol in _SYMBOLS for prefix in prefixes if (prefix, symbol) != ("M", "m"))]
 
 
 def _known() -> str:

@@ -8,11 +8,14 @@
 - :mod:`.evaluation`: values, derivatives and Newton steps at a state
 - :mod:`.of_scene`: the potential of a scene, built once
 - :mod:`.family`: the potential of scenes that differ in one number
+- :mod:`.contact`: the potential before rigid bodies
+- :mod:`.contact_family`: that of scenes before bodies that differ in one number
 - :mod:`.numbered`: the potential of scenes that differ in several numbers
 - :mod:`.strain_energy`: strain energies of one's own
 """
 
 from ..kernels.interface import Array as Array
+from .contact_family import ContactFamily as ContactFamily
 from .evaluation import Evaluation as Evaluation
 from .family import Family as Family
 from .family import FoldDerivatives as FoldDerivatives

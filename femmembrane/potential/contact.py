@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..kernels import kernels
-from ..kernels.bordered import BorderedFactor
+from ..kernels.bordered import BorderedFactor, SpringFactor
 from ..kernels.interface import Array, Border, Factor, Step
+from ..physics.loads import over_projection
 from ..physics.obstacles import ROUND_OFF, Straight
 from ..threads import cached_property
 from .evaluation import Evaluation
@@ -38,6 +39,7 @@ from .potential import Potential
 
 if TYPE_CHECKING:
     from ..discretization.space import Space
+    from ..physics.obstacles import Obstacle
     from ..scene import Scene
 
 #: force that holds a node, over the largest forces that meet at a node, that is round-off
@@ -45,7 +47,7 @@ NO_FORCE = 1e-11
 #: and that is too little to say whether a perturbation would lift the node off
 _WEAK = 1e-8
 #: part of its neighbour's normal by which a node must be able to move for a body to hold it
-_ACROSS = 1e-6
+ACROSS = 1e-6
 
 #: keeps the distance from a centre differentiable
 _TINY = 1e-300
@@ -125,7 +127,10 @@ class Reduction:
         return v
 
     def band(self, band: Array, kd: int, diagonal: Array | None = None) -> Array:
-        """A symmetric band matrix in the unknowns that are left; in the empty places a diagonal, left out: the size of its own."""
+        """A symmetric band matrix in the unknowns that are left; in the empty places a diagonal, left out: the largest one.
+
+        The normal stiffness of a held node would not do: it vanishes where a stress does, and would stand among the eigenvalues.
+        """
         n, depth = self.size, band.shape[0]
         flat = band.T.ravel().copy()  # A[i, j] at j depth + 2 kd + i - j
 
@@ -135,7 +140,7 @@ class Reduction:
 
         near = np.arange(-kd - 1, kd + 2)
         flat = np.append(flat, 0.0)  # what lies outside of the band
-        own = np.abs(flat[at(self.out, self.out)]) if diagonal is None else diagonal
+        own = np.full(self.out.shape, np.abs(band[2 * kd]).max(initial=0.0)) if diagonal is None else diagonal
         if self.iu.size:
             others = self.iu[:, None] + near
             for order in (1, -1):  # rows, then columns
@@ -185,20 +190,15 @@ class ContactEvaluation(Evaluation):
         iu, iw = potential.place
         self.reduction = Reduction(iu[held], iw[held], gaps.n_rho[held], gaps.n_eta[held], space.n_free)
         forces = self.reduction.projected(raw._forces)
-        super().__init__(
-            raw.x,
-            raw.elastic_energy,
-            raw.magnetic_energy,
-            raw.volume,
-            raw.finite,
-            forces,
-            raw._densities,
-            potential,
-            raw.elements,
-            raw.factor,
-        )
+        answer = raw.elastic_energy, raw.magnetic_energy, raw.volume, raw.finite, forces, raw._densities
+        spring = None if raw.spring is None else self.reduction.projected(raw.spring)
+        super().__init__(raw.x, answer, potential, raw.elements, raw.factor, spring)
         self.held, self.gaps, self._raw = held, gaps, raw
         self.forces = np.where(held, potential.normal_forces(raw, gaps), 0.0)
+
+    @property
+    def raw(self) -> Evaluation:
+        return self._raw
 
     @property
     def band(self) -> Array:
@@ -228,6 +228,15 @@ class ContactEvaluation(Evaluation):
         potential = cast(ContactPotential, self.potential)
         return np.asarray(row @ potential.to_root) if potential.borders else row
 
+    def pressed_flat(self) -> Mask | None:
+        potential = cast(ContactPotential, self.potential)
+        degree, n_elements = potential.space.degree, potential.space.n_elements
+        on: Mask = np.ones(degree * n_elements + 1, dtype=bool)  # a node that cannot move at all takes part
+        on[potential.nodes] = self.held
+        on[-1] &= on[0] or not potential.space.closed
+        inner = cast("Mask", np.stack([on[j : j + degree * n_elements : degree] for j in range(degree + 1)]).all(axis=0))
+        return inner if self.held.any() and inner.any() else None
+
     def released(self) -> ContactEvaluation | None:
         potential = cast(ContactPotential, self.potential)
         u, w = self._raw.force_scale(0.0)
@@ -251,11 +260,18 @@ class ContactEvaluation(Evaluation):
         lightest = np.abs(mass[2 * kd]).min()
         return self.reduction.band(mass, kd, np.full(self.reduction.out.shape, lightest))
 
+    def reduced_form(self, band: Array, half_bandwidth: int) -> Array:
+        return self.reduction.band(band, half_bandwidth)
+
     def factors(self) -> Factor:
-        return ReducedFactor(kernels().factor(self.band), self.reduction)
+        factor: Factor = kernels().factor(self.band)
+        if self.spring is not None:
+            factor = SpringFactor(factor, self.reduced(self.spring))
+        return ReducedFactor(factor, self.reduction)
 
     def inner(self, x: Array, y: Array) -> float:
-        return kernels().inner(self.band, self.potential.space.half_bandwidth, self.reduced(x), self.reduced(y))
+        own = kernels().inner(self.band, self.potential.space.half_bandwidth, self.reduced(x), self.reduced(y))
+        return own if self.spring is None else own + float(self.spring @ x) * float(self.spring @ y)
 
     def border(self, row: Array, corner: float) -> Border:
         return BorderedFactor(self.factors(), -self.volume_gradient, row, corner)
@@ -294,7 +310,7 @@ class ContactPotential(Potential):
         return bare
 
     @property
-    def borders(self) -> Borders:
+    def borders(self) -> Borders:  # type: ignore[override]  # read only here, and there
         """Ends of elements that stand at borders of contact, and their places."""
         return self.scene.borders
 
@@ -305,11 +321,22 @@ class ContactPotential(Potential):
             return root
         known = root._moved.pop(borders, None)
         if known is None:
-            known = ContactPotential(root.scene.bordered(borders), root=root)
+            known = root._on(borders)
         root._moved[borders] = known
         if len(root._moved) > _KEPT:
             root._moved.pop(next(iter(root._moved)), None)
         return known
+
+    def _on(self, borders: Borders) -> ContactPotential:
+        return ContactPotential(self.scene.bordered(borders), root=self)
+
+    def bodies_at(self, factor: float) -> tuple[Obstacle, ...]:
+        """The bodies. ``factor`` as in :meth:`evaluate`: in a family of scenes it may be a number of theirs."""
+        return self.obstacles
+
+    def edge_load(self, evaluation: Evaluation, eta: float) -> float:
+        """What loads over the projected area have, per area, at a height."""
+        return evaluation.factor * float(over_projection(self.loads, np.array(eta))[0]) if self.loads else 0.0
 
     @cached_property
     def to_root(self) -> sparse.csr_matrix:
@@ -327,7 +354,7 @@ class ContactPotential(Potential):
         space, ends = self.root.space, self.root.space.ends
         found = np.zeros(ends.size, dtype=bool)
         if space.n_elements > 1:
-            kinks = space._ends_of_elements[3][: space.n_elements - 1]
+            kinks = space.ends_of_elements[3][: space.n_elements - 1]
             found[1:-1] = kinks < 1e-6
             found[space.breaks] = False
         return found
@@ -377,15 +404,19 @@ class ContactPotential(Potential):
         last = self.nodes.size - 1
         return [(int(k), 1 if k == 0 else last - 1) for k in np.flatnonzero(self._on_axis) if last > 0]
 
-    def positions(self, x: Array) -> tuple[Array, Array]:
-        """(rho, eta) of :attr:`nodes`."""
-        extended, (iu, iw), (R, Z) = self.space.extend(x), self.place, self._rest
+    def rest_at(self, factor: float) -> tuple[Array, Array]:
+        """Where the nodes are while all unknowns are zero. ``factor`` as in :meth:`evaluate`."""
+        return self._rest
+
+    def positions(self, x: Array, factor: float = 1.0) -> tuple[Array, Array]:
+        """(rho, eta) of :attr:`nodes`. ``factor`` as in :meth:`evaluate`."""
+        extended, (iu, iw), (R, Z) = self.space.extend(x), self.place, self.rest_at(factor)
         return R + extended[iu], Z + extended[iw]
 
-    def gaps(self, x: Array) -> Gaps:
-        """Gaps at the nodes in a state."""
-        rho, eta = self.positions(x)
-        found = [body.touch(rho, eta) for body in self.obstacles]
+    def gaps(self, x: Array, factor: float = 1.0) -> Gaps:
+        """Gaps at the nodes in a state. ``factor`` as in :meth:`evaluate`."""
+        rho, eta = self.positions(x, factor)
+        found = [body.touch(rho, eta) for body in self.bodies_at(factor)]
         body = np.argmin([touch.gap for touch in found], axis=0)
         gap, n_rho, n_eta, curvature, size = (
             np.choose(body, [getattr(touch, name) for touch in found]) for name in ("gap", "n_rho", "n_eta", "curvature", "size")
@@ -396,7 +427,7 @@ class ContactPotential(Potential):
         for first, second, across, other in ((iu, iw, n_rho, n_eta), (iw, iu, n_eta, n_rho)):
             alone = (first < n) & (second == n)  # the one motion that the node has
             if alone.any():
-                gap = np.where(alone, gap / np.maximum(np.abs(across), _ACROSS), gap)
+                gap = np.where(alone, gap / np.maximum(np.abs(across), ACROSS), gap)
                 across[:] = np.where(alone, np.where(across < 0, -1.0, 1.0), across)
                 other[:] = np.where(alone, 0.0, other)
                 curvature = np.where(alone, 0.0, curvature)
@@ -414,12 +445,19 @@ class ContactPotential(Potential):
             judged[pole] += forces[neighbour]
         return judged
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         """As :meth:`.Potential.evaluate`, with the nodes held that lie on a body and are pushed away from it."""
         raw = super().evaluate(x, pressure, magnetic)
-        gaps = self.gaps(raw.x)
+        gaps = self.gaps(raw.x, magnetic)
         forces = self.with_poles(self.normal_forces(raw, gaps))
         return ContactEvaluation(raw, self, gaps, gaps.close & (forces >= -self._round_off(raw, gaps, pressure)))
+
+    def beside(self, x: Array, pressure: float) -> tuple[ContactEvaluation, ContactEvaluation]:
+        """A state in which a body is touched without a force, without the nodes that are held by none, and with all that lie on a body."""
+        raw = super().evaluate(x, pressure)
+        gaps = self.gaps(raw.x)
+        held = ContactEvaluation(raw, self, gaps, gaps.close)
+        return held.released() or held, held
 
     def _round_off(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Array:
         """Normal forces at the nodes that are round-off: on a nearly flat membrane those along the axis are much smaller than others."""
@@ -430,7 +468,7 @@ class ContactPotential(Potential):
     def pressed(self, x: Array, pressure: float, magnetic: float) -> Mask:
         """Which nodes a solve from a state sets out to hold: those inside a body, and those that are pushed more than they are away."""
         raw = super().evaluate(x, pressure, magnetic)
-        return self.judged(raw, self.gaps(raw.x), pressure)
+        return self.judged(raw, self.gaps(raw.x, magnetic), pressure)
 
     def judged(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Mask:
         """The next set of held nodes: where the force exceeds the stiffness times the gap."""
@@ -451,9 +489,14 @@ class ContactPotential(Potential):
         """A displacement here in the coefficients on the mesh of the scene."""
         return np.asarray(self.to_root @ v) if self.borders else v
 
+    @property
+    def given(self) -> float:
+        """The third argument of :meth:`evaluate` for the scene itself."""
+        return 1.0
+
     def touching(self, x: Array) -> float:
-        """The least gap of a state at its nodes."""
-        return float(self.gaps(x).gap.min(initial=np.inf))
+        """The least gap of a state of the scene at its nodes."""
+        return float(self.gaps(x, self.given).gap.min(initial=np.inf))
 
 
 class Held(ContactPotential):
@@ -468,38 +511,39 @@ class Held(ContactPotential):
     def __init__(self, base: ContactPotential, held: Mask) -> None:
         self.__dict__.update(base.__dict__, _root=base.root)
         self.base, self.held = base, held
-        self._looked_at: tuple[Array, Gaps] | None = None
+        self._looked_at: tuple[Array, float, Gaps] | None = None
 
     @property
     def unsettled(self) -> bool:  # type: ignore[override]
         return False
 
-    def placed(self, x: Array) -> Array:
-        """A state with its held nodes moved onto the bodies."""
+    def placed(self, x: Array, factor: float = 1.0) -> Array:
+        """A state with its held nodes moved onto the bodies. ``factor`` as in :meth:`evaluate`."""
         if not self.held.any():
             return x
         x, (iu, iw), n = np.array(x, dtype=float), self.place, self.space.n_free
         for _ in range(3):
-            gaps = self.gaps(x)
+            gaps = self.gaps(x, factor)
             moved = self.held & ~gaps.close
             if not moved.any():
-                self._looked_at = x, gaps
+                self._looked_at = x, factor, gaps
                 break
             for index, normal in ((iu, gaps.n_rho), (iw, gaps.n_eta)):
                 own = moved & (index < n)
                 x[index[own]] -= (gaps.gap * normal)[own]
         return x
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         raw, known = Potential.evaluate(self, x, pressure, magnetic), self._looked_at
-        return ContactEvaluation(raw, self, known[1] if known is not None and known[0] is raw.x else self.gaps(raw.x), self.held)
+        same = known is not None and known[0] is raw.x and known[1] == magnetic
+        return ContactEvaluation(raw, self, known[2] if known is not None and same else self.gaps(raw.x, magnetic), self.held)
 
 
 def gap_rows(potential: ContactPotential, y: ca.MX, p: ca.MX) -> ca.MX:
     """Gaps at the nodes over the size of the membrane, as functions of scaled unknowns y (scales p[2], p[3])."""
     R, Z = potential._rest
     (iu, iw), n = potential.place, potential.space.n_free
-    padded = ca.vertcat(y, 0)
+    padded = ca.vertcat(y[:n], 0)  # a voltage may stand behind the displacements
     rho = ca.DM(R) + p[2] * padded[np.minimum(iu, n).tolist()]
     eta = ca.DM(Z) + p[3] * padded[np.minimum(iw, n).tolist()]
     one, other = ca.SX.sym("rho"), ca.SX.sym("eta")

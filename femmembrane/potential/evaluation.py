@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor, SpringFactor
-from ..kernels.interface import N_FORCE, N_STIFFNESS, Array, Border, Elements, Factor, Step
+from ..kernels.interface import N_FORCE, N_STIFFNESS, Answer, Array, Border, Elements, Factor, Step
 
 if TYPE_CHECKING:
     from .potential import Potential
@@ -31,31 +32,21 @@ class Evaluation:
         a, where the second derivatives are the band plus a a^T: with a total charge, which couples all points.
     """
 
-    __slots__ = (
-        *("x", "elastic_energy", "magnetic_energy", "volume", "finite"),
-        *("potential", "elements", "factor", "spring", "_forces", "_densities", "_band", "_negative", "_known"),
-    )
+    _band: Array | None = None
+    _negative: int | None = None
 
     def __init__(
         self,
         x: Array,
-        elastic_energy: float,
-        magnetic_energy: float,
-        volume: float,
-        finite: bool,
-        forces: Array,
-        densities: Array,
+        answer: Answer,
         potential: Potential,
         elements: Elements,
         factor: float,
         spring: Array | None = None,
     ) -> None:
-        self.x, self.elastic_energy, self.magnetic_energy, self.volume, self.finite = x, elastic_energy, magnetic_energy, volume, finite
-        self.potential, self.elements, self.factor, self._forces, self._densities = potential, elements, factor, forces, densities
-        self.spring = spring
-        self._band: Array | None = None
-        self._negative: int | None = None
-        self._known: dict[str, float] | None = None
+        self.x, self.potential, self.elements, self.factor, self.spring = x, potential, elements, factor, spring
+        self.elastic_energy, self.magnetic_energy, self.volume, self.finite, self._forces, self._densities = answer
+        self._known: dict[str, float] = {}
 
     @property
     def force_density(self) -> Array:
@@ -87,12 +78,9 @@ class Evaluation:
     def once(self, name: str, compute: Callable[[Evaluation], float]) -> float:
         """A number that belongs to this state, computed when first asked for under its name."""
         known = self._known
-        if known is None:
-            known = self._known = {}
-        value = known.get(name)
-        if value is None:
-            value = known[name] = compute(self)
-        return value
+        if name not in known:
+            known[name] = compute(self)
+        return known[name]
 
     @property
     def band(self) -> Array:
@@ -107,13 +95,19 @@ class Evaluation:
     def negative(self) -> int:
         """Number of negative eigenvalues of E'' - P V'': counted once, as two neighbouring steps of a branch ask for it."""
         if self._negative is None:
-            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, self.spring, 1.0)
+            spring = None if self.spring is None else self.reduced(self.spring)
+            self._negative = kernels().inertia(self.band, self.potential.space.half_bandwidth, spring, 1.0)
         return self._negative
 
     def factors(self) -> Factor:
         """Factors of E'' - P V''."""
         factor = kernels().factor(self.band)
         return factor if self.spring is None else SpringFactor(factor, self.spring)
+
+    @property
+    def raw(self) -> Evaluation:
+        """The same state with what bodies take: this one, unless they hold nodes."""
+        return self
 
     def carried(self, v: Array) -> Array:
         """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
@@ -126,6 +120,10 @@ class Evaluation:
     def row(self, row: Array) -> Array:
         """A linear form of :meth:`carried` displacements as one of displacements here."""
         return row
+
+    def pressed_flat(self) -> NDArray[np.bool_] | None:
+        """Which elements lie on a body all over, shape (n_elements,), so that no short wave lifts them; None where none does."""
+        return None
 
     def released(self) -> Evaluation | None:
         """The same state without the nodes that bodies hold by no force; None where there are none."""
@@ -142,6 +140,10 @@ class Evaluation:
     def expanded(self, v: Array) -> Array:
         """The displacement of a vector in the unknowns of :attr:`band`."""
         return v
+
+    def reduced_form(self, band: Array, half_bandwidth: int) -> Array:
+        """Another symmetric band matrix in the unknowns of :attr:`band`."""
+        return band
 
     def reduced_mass(self, mass: Array) -> Array:
         """A mass matrix in the unknowns of :attr:`band`."""

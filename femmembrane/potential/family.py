@@ -90,6 +90,8 @@ class Family(Potential):
             scene = scene.replace(electric=replace(scene.electric, **{scene.electric.load: 1.0}))
         self.scene, self.sources, self.loads = scene, scene.sources, scene.loads
         self.magnetisation = Magnetisation.of(scene) if scene.sources else None
+        if self._like is not None:  # whose terms know the number
+            return
         slot = self.symbols[2][1]
         names = list(self.terms)
         old, new = ca.vertcat(slot, number), ca.vertcat(1.0, slot)
@@ -116,7 +118,7 @@ class Family(Potential):
         """Derivative of the height of the pole, at fixed unknowns, with respect to the number."""
         return 0.0 if self._way is None else self._way.unit.axial[0]
 
-    def member(self, number: float) -> Member:
+    def member(self, number: float) -> Potential:
         """The potential of the scene that has a value of the number. Nothing is built for it; the last ones are kept.
 
         Raises
@@ -151,9 +153,34 @@ class Family(Potential):
             before, beyond = (middle, beyond) if self.takes(middle) else (before, middle)
         return before
 
+    def home(self, evaluation: Evaluation, pressure: float) -> Evaluation:
+        """A state of the family as one of its own scene."""
+        return self.member(evaluation.factor).evaluate(evaluation.x, pressure)
+
+    def came_through_source(self, number: float, x: Array, before: float, x_before: Array) -> bool:
+        """Whether the membrane went through a source on the way from a state of another member, where that source stood elsewhere.
+
+        What counts is the way relative to the source.
+        """
+        here, there = self.member(number), self.member(before)
+        if not here.sources or len(here.sources) != len(there.sources):
+            return False
+        meridians = there._meridian(x_before), here._meridian(x)
+        heights = list(zip(here.space.axis_heights(x_before), here.space.axis_heights(x), strict=True))
+        for source, old in zip(here.sources, there.sources, strict=True):
+            rise = getattr(source, "height", 0.0) - getattr(old, "height", 0.0)
+            if any(source.passed(start + rise, end) for start, end in heights):
+                return True
+            for circle, place in zip(source.circles, old.circles, strict=True):
+                if swept(meridians[0] + (np.array(circle) - np.array(place))[:, None], meridians[1], circle):
+                    return True
+        return False
+
     @cached_property
     @BUILDING
     def _fold_kernel(self) -> Replay:
+        if isinstance(self._like, Family):
+            return Replay(self._like._fold_kernel.function, self.point_data)
         t, (data, local, parameters) = self.terms, self.symbols
         mode, q = ca.SX.sym("mode", 4), ca.SX.sym("q")
         force = t["gradient"] - parameters[0] * t["volume_gradient"]
@@ -165,6 +192,8 @@ class Family(Potential):
     @cached_property
     @BUILDING
     def _number_kernel(self) -> Replay:
+        if isinstance(self._like, Family):
+            return Replay(self._like._number_kernel.function, self.point_data)
         t, (data, local, parameters) = self.terms, self.symbols
         force = ca.jacobian(t["gradient"] - parameters[0] * t["volume_gradient"], parameters[1])
         rows = ca.vertcat(force, ca.jacobian(t["volume"], parameters[1]))
@@ -176,6 +205,14 @@ class Family(Potential):
         own = self.space.assemble_vector(rows.reshape(-1, self.space.n_elements))
         return own if self.charged is None else own + self.charged.number_derivative(x, number)
 
+    def advance(self, evaluation: Evaluation) -> float:
+        """How far bodies come to a membrane at a state for each unit of the number, over the size of the membrane."""
+        return 0.0
+
+    def number_rates(self, evaluation: Evaluation, pressure: float) -> tuple[Array, Array | None]:
+        """:meth:`number_derivative` at a state, and how bodies that hold nodes move these with the number; None where none does."""
+        return self.number_derivative(evaluation.x, pressure, evaluation.factor), None
+
     def _number_rows(self, x: Array, pressure: float, number: float) -> Array:
         more = [] if self.charged is None else [self.charged.square(x, number)]
         return self._number_kernel(self.space.at_quadrature(x), np.array([pressure, number, *more]))
@@ -185,6 +222,10 @@ class Family(Potential):
         if not self.moves:
             return 0.0
         return float(self._number_rows(x, 0.0, number)[4].sum())
+
+    def fold_rates(self, evaluation: Evaluation, pressure: float, mode: Array, q: float) -> tuple[FoldDerivatives, Array | None]:
+        """:meth:`fold_derivatives` at a state, and how bodies that hold nodes move these with the number; None where none does."""
+        return self.fold_derivatives(evaluation.x, pressure, evaluation.factor, mode, q), None
 
     def fold_derivatives(self, x: Array, pressure: float, number: float, mode: Array, q: float) -> FoldDerivatives:
         """Third derivatives contracted twice with a mode (v, q), and derivatives with respect to the number."""
@@ -232,11 +273,11 @@ class Member(Potential):
     def elements(self) -> Elements:
         return self.family.elements
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         """As :meth:`.Potential.evaluate`; with weaker sources it is the scene's own potential that answers."""
         if magnetic != 1.0:
             return potential_of(self.scene).evaluate(x, pressure, magnetic)
-        return self._evaluated(x, pressure, self.number, magnetic)
+        return super().evaluate(x, pressure, magnetic, self.number)
 
     @property
     def charged(self) -> Charged | None:
@@ -248,21 +289,3 @@ class Member(Potential):
 
     def electric_energy(self, x: Array, factor: float = 1.0) -> float:
         return self.family.electric_energy(x, self.number) if factor == 1.0 else potential_of(self.scene).electric_energy(x, factor)
-
-    def came_through_source(self, x: Array, before: Member, x_before: Array) -> bool:
-        """Whether the membrane went through a source on the way from a state of another member, where that source stood elsewhere.
-
-        What counts is the way relative to the source.
-        """
-        if not self.sources or len(self.sources) != len(before.sources):
-            return False
-        meridians = before._meridian(x_before), self._meridian(x)
-        heights = list(zip(self.space.axis_heights(x_before), self.space.axis_heights(x), strict=True))
-        for source, old in zip(self.sources, before.sources, strict=True):
-            rise = getattr(source, "height", 0.0) - getattr(old, "height", 0.0)
-            if any(source.passed(start + rise, end) for start, end in heights):
-                return True
-            for circle, place in zip(source.circles, old.circles, strict=True):
-                if swept(meridians[0] + (np.array(circle) - np.array(place))[:, None], meridians[1], circle):
-                    return True
-        return False

@@ -247,6 +247,6 @@ class NumberedMember(Potential):
     def pole_rise(self, factor: float) -> float:
         return self.family.pole_rise_at(self.values)
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
         elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
-        return Evaluation(x, *elements.evaluate(x, pressure, magnetic, *self.values), self, elements, magnetic)
+        return Evaluation(x, elements.evaluate(x, pressure, magnetic, *self.values), self, elements, magnetic)

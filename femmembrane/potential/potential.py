@@ -61,6 +61,8 @@ class Potential(PointTerms):
     #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
     obstacles: tuple[Obstacle, ...] = ()
     unsettled = False
+    #: ends of elements that stand at borders of contact, and their places
+    borders: tuple[tuple[int, float], ...] = ()
     #: a potential with the same expressions on other points
     _like: Potential | None = None
     symbols: tuple[ca.SX, ca.SX, ca.SX]
@@ -125,9 +127,13 @@ class Potential(PointTerms):
         self.n_points = self.point_data.shape[1]
         self._elements: dict[str, Elements] = {}  # of each implementation that was asked
 
-    def placed(self, x: Array) -> Array:
-        """A state with the nodes that bodies hold moved onto them."""
+    def placed(self, x: Array, factor: float = 1.0) -> Array:
+        """A state with the nodes that bodies hold moved onto them. ``factor`` as in :meth:`evaluate`."""
         return x
+
+    def by_itself(self, factor: float) -> tuple[Potential, float]:
+        """The potential that a minimiser takes, and its factor: this one, but for a family whose constraints change with its number."""
+        return self, factor
 
     def pole_rise(self, factor: float) -> float:
         """How far the pole stands above its place in the space while all unknowns are zero: only a number that moves an end lifts it."""
@@ -250,17 +256,16 @@ class Potential(PointTerms):
     def _point(self) -> PointProgram:
         return PointProgram(self.point_function, self.point_data, None if self._like is None else self._like._point)
 
-    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0) -> Evaluation:
-        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads."""
-        return self._evaluated(x, pressure, magnetic, magnetic)
-
-    def _evaluated(self, x: Array, pressure: float, slot: float, magnetic: float) -> Evaluation:
-        """:meth:`evaluate` with what the point function takes for the factor on sources and loads."""
+    def evaluate(self, x: Array, pressure: float, magnetic: float = 1.0, slot: float | None = None) -> Evaluation:
+        """Value, gradient and Hessian of E - P V at the free coefficients x; ``magnetic`` scales sources and loads. ``slot`` is what the
+        point function takes for it, where that is another number.
+        """
         elements, x = self.elements, np.ascontiguousarray(x, dtype=float)
+        factor = magnetic if slot is None else slot
         if self.charged is None:
-            return Evaluation(x, *elements.evaluate(x, pressure, slot), self, elements, magnetic)
-        square, spring = self.charged.at(x, slot)
-        return Evaluation(x, *elements.evaluate(x, pressure, slot, square), self, elements, magnetic, spring)
+            return Evaluation(x, elements.evaluate(x, pressure, factor), self, elements, magnetic)
+        square, spring = self.charged.at(x, factor)
+        return Evaluation(x, elements.evaluate(x, pressure, factor, square), self, elements, magnetic, spring)
 
     def load_energy(self, x: Array, factor: float = 1.0) -> float:
         """Energy of the loads at the free coefficients x, with the 2 pi; 0 without loads. ``factor`` as in :meth:`evaluate`."""

@@ -54,7 +54,7 @@ class Replay:
 
     @BUILDING
     def __init__(self, function: ca.Function, data: Array) -> None:
-        n = data.shape[1]
+        n, self.function = data.shape[1], function
         self.block = min(n, _BLOCK)
         self.n_blocks = -(-n // self.block)
         self.n, self.rows = n, function.numel_out(0)

@@ -32,7 +32,20 @@ _FIXED: dict[type, frozenset[str]] = {
 _ELSEWHERE = frozenset(
     {
         *("mesh", "degree", "element_ends", "prestretch", "thickness", "modulus", "sources", "loads"),
-        *("obstacles", "borders", "title", "run", "analysis", "scales", "radius_to_thickness", "chamber", "electric", "bending"),
+        *(
+            "obstacles",
+            "bodies",
+            "borders",
+            "title",
+            "run",
+            "analysis",
+            "scales",
+            "radius_to_thickness",
+            "chamber",
+            "electric",
+            "bending",
+            "squeezed",
+        ),
     }
 )
 _PACKAGE = __name__.partition(".")[0] + "."

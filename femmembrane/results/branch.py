@@ -342,13 +342,14 @@ class Branch(Sequence[Equilibrium]):
     def notes(self) -> tuple[str, ...]:
         """The remarks, sources that the membrane enters, loads that no such membrane holds, remarks on the mesh, and free motions."""
         from ..discretization.space import space_of_scene
-        from ..scene.absurd_loads import remarks_on_loads
+        from ..scene.absurd_loads import remarks_on_loads, remarks_on_scales
         from .entered import remarks_on_entered
 
         mesh = tuple(f"mesh: {what}" for what in getattr(self.scene.mesh, "remarks", ()))
         if self.scene.open:
             return self.remarks
-        return (*self.remarks, *remarks_on_entered(self), *remarks_on_loads(self.scene), *mesh, *space_of_scene(self.scene).notes)
+        unlikely = (*remarks_on_scales(self.scene.scales), *remarks_on_loads(self.scene))
+        return (*self.remarks, *remarks_on_entered(self), *unlikely, *mesh, *space_of_scene(self.scene).notes)
 
     def zones_along(self) -> ZonesAlong:
         """Zones of all equilibria and, where their kinds change from one to the next, of states between them."""

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: relative difference of curvatures of a body that is round-off
+_SAME_CURVATURE = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class ContactZone:
@@ -34,6 +37,8 @@ class ContactZone:
         Integral of the pressure of contact over the deformed area, and this area over R0^2.
     followed : bool
         Whether ends of elements stand at its borders. A zone shorter than two elements has its ends at nodes.
+    smooth : bool
+        Whether the curvature of the body under it does not jump, as it does where a flat face goes over into a rounded edge.
     """
 
     body: int
@@ -45,6 +50,7 @@ class ContactZone:
     normal_force: float
     area: float
     followed: bool
+    smooth: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +154,7 @@ def contact_of(evaluation: Any) -> Contact:
     pressures = np.zeros(space.degree * space.n_elements + 1)
     u, u_x, _, w_x = space.displacement_at_quadrature(own.x)
     area = space.weights * (space.R + u) * np.hypot(space.R_x + u_x, space.Z_x + w_x)  # with the 2 pi
-    ends, n_eta = {end for end, _ in potential.borders}, own.gaps.n_eta
+    ends, n_eta, curvature = {end for end, _ in potential.borders}, own.gaps.n_eta, own.gaps.curvature
     parameters = space.node_parameters()
     place = {int(node): k for k, node in enumerate(potential.nodes)}
     zones = []
@@ -181,6 +187,7 @@ def contact_of(evaluation: Any) -> Contact:
                 float(forces.sum()),
                 covered,
                 {first, last} <= at_ends,
+                bool(np.ptp(curvature[held]) <= _SAME_CURVATURE * np.abs(curvature[held]).max()),
             )
         )
     return Contact(tuple(zones), float(np.abs(own.gaps.gap).min()) if zones else float(own.gaps.gap.min()), own, pressures)

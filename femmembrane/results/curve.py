@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from ..solve.between import (
     chord_between,
     cubic,
     direction_at,
+    directions_beside,
     followed,
     rates_along,
     rounded,
@@ -44,6 +45,7 @@ from .special_point import Jump, SpecialPoint
 
 if TYPE_CHECKING:
     from ..potential import Potential
+    from ..potential.contact import ContactPotential
     from ..scene import Scene
     from .branch import Branch
 
@@ -55,10 +57,14 @@ CLOSE = 5e-5
 _FINE, _MOST = 2e-5, 64
 #: how often an arc is halved, at most
 _HALVED = 6
+#: slope over that of a chord from which on a cubic may swing beyond its ends (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980))
+_STEEPEST = 3.0
 #: shares of an arc at which values are looked for
 _GRID = np.linspace(0.0, 1.0, 17)
 #: the same where a place is looked for that turns back
 _TURNS = np.linspace(0.0, 1.0, 65)
+#: special points at which a branch has a corner
+CORNERS = ("touch", "release")
 #: what is held where the membrane snaps at a fold
 HELD_AT = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "center_height"}
 
@@ -199,24 +205,35 @@ class BranchCurve:
         return self._computed(landing.scene, potential, last)
 
     def _computed(self, scene: Scene, potential: Potential, state: State) -> CurvePoint:
-        equilibrium = recorded(scene, potential, state.x, state.pressure, state.evaluation, Status.CONVERGED, state.residual)
+        own, x = state.evaluation, state.x
+        if potential.obstacles:
+            scene, potential, x = scene.bordered(own.potential.scene.borders), own.potential, own.x
+        equilibrium = recorded(scene, potential, x, state.pressure, own, Status.CONVERGED, state.residual)
         return CurvePoint(equilibrium, None, None, self._node(equilibrium))
 
     # --- their nodes
 
     def _problem(self, equilibrium: Equilibrium) -> BranchProblem:
-        """The equations of the scene of an equilibrium; scenes are told apart by their objects, which are few."""
+        """The equations of the scene of an equilibrium, on the mesh of the scene; scenes are told apart by their objects, which are few."""
         key = id(equilibrium.scene)
         if key not in self._problems:
-            self._problems[key] = BranchProblem(equilibrium.potential)
+            potential = equilibrium.potential.root
+            known = (problem for problem in self._problems.values() if problem.potential is potential)
+            self._problems[key] = next(known, None) or BranchProblem(potential)
         return self._problems[key]
 
     def _same(self, a: Equilibrium, b: Equilibrium) -> bool:
         return self._problem(a).potential is self._problem(b).potential
 
     def _node(self, equilibrium: Equilibrium) -> Node:
-        z = joined(equilibrium.state, equilibrium.pressure)
-        return Node(z, self._places([equilibrium])[0], self._direction(equilibrium))
+        return Node(self._unknowns(equilibrium), self._places([equilibrium])[0], self._direction(equilibrium))
+
+    def _unknowns(self, equilibrium: Equilibrium) -> Array:
+        """(x, P) on the mesh of the scene, wherever ends of elements follow borders of contact."""
+        x = equilibrium.state
+        if equilibrium.scene.borders:
+            x = cast("ContactPotential", equilibrium.potential).carried(x)
+        return joined(x, equilibrium.pressure)
 
     def _places(self, items: Sequence[Equilibrium | SpecialPoint]) -> Array:
         return places_of(items, self.branch.over)
@@ -225,15 +242,19 @@ class BranchCurve:
         """The direction of the branch at an equilibrium, found once; None over a number, which a tangent of one scene does not move."""
         if self.branch.over or equilibrium.status.ill_posed:
             return None
-        potential = self._problem(equilibrium).potential
+        potential = equilibrium.potential if self.branch.scene.bodies else self._problem(equilibrium).potential
         return equilibrium.remembered(("tangent",), lambda: direction_at(potential, equilibrium.state, equilibrium.pressure))
 
     def _special_node(self, point: SpecialPoint) -> Node:
         """A branch point has two directions, of which the one of this branch is known; a point apart from its state has none."""
         equilibrium, places = point.equilibrium, self._places([point])[0]
-        z = joined(equilibrium.state, equilibrium.pressure)
+        z = self._unknowns(equilibrium)
+        corner = str(point.kind) in CORNERS
         if self.branch.over or not np.array_equal(places, self._places([equilibrium])[0]):
-            return Node(z, places, None)
+            return Node(z, places, None, corner=corner)
+        if corner:
+            free, held = equilibrium.remembered(("tangents",), lambda: self._beside(equilibrium))
+            return Node(z, places, free, held, corner) if point.kind == "touch" else Node(z, places, held, free, corner)
         if str(point.kind) != "branch_point":
             return self._node(equilibrium)
         if point.tangent is None:
@@ -241,6 +262,10 @@ class BranchCurve:
         potential = self._problem(equilibrium).potential
         evaluation = potential.evaluate(equilibrium.state, equilibrium.pressure)
         return Node(z, places, Direction(point.tangent, rates_along(potential, equilibrium.pressure, evaluation, point.tangent)))
+
+    def _beside(self, equilibrium: Equilibrium) -> tuple[Direction | None, Direction | None]:
+        potential = cast("ContactPotential", equilibrium.potential)
+        return directions_beside(potential, equilibrium.state, equilibrium.pressure)
 
     # --- its pieces
 
@@ -297,7 +322,7 @@ class BranchCurve:
         return [piece for c, d in pairwise([a, *between, b]) for piece in self._between(c, d, 2)]
 
     def _can_be_checked(self, a: CurvePoint, b: CurvePoint) -> bool:
-        return a.node.direction is not None and b.node.direction is not None and self._same(a.equilibrium, b.equilibrium)
+        return a.node.onward is not None and b.node.direction is not None and self._same(a.equilibrium, b.equilibrium)
 
     # --- quantities along it
 
@@ -355,8 +380,12 @@ class BranchCurve:
         lengths = np.array([piece.arc.length for piece in run])
         points = [run[0].a, *(piece.b for piece in run)]
         values = _steps(points, lengths) if name == "step" else np.array([self.value(point, name) for point in points])
-        slopes = _slopes(values, lengths)
-        return list(zip(values[:-1], values[1:], slopes[:-1], slopes[1:], strict=True))
+        corners = [k for k in range(1, len(run)) if points[k].node.corner]
+        if not corners:
+            slopes = slopes_of(values, lengths)
+            return list(zip(values[:-1], values[1:], slopes[:-1], slopes[1:], strict=True))
+        parts = [_between_corners(values[a : b + 1], lengths[a:b]) for a, b in pairwise([0, *corners, len(run)])]
+        return [piece for part in parts for piece in part]
 
     # --- where it takes a value
 
@@ -467,7 +496,7 @@ def _polygon(ends: Sequence[_Ends], scale: Array, length: float) -> Array:
     return line
 
 
-def _slopes(values: Array, lengths: Array) -> Array:
+def slopes_of(values: Array, lengths: Array) -> Array:
     """Slopes of parabolas through three neighbours each; at the ends of those through the first three and the last three."""
     chords = np.diff(values) / lengths
     if len(lengths) == 1:
@@ -475,6 +504,20 @@ def _slopes(values: Array, lengths: Array) -> Array:
     share = lengths[:-1] / (lengths[:-1] + lengths[1:])
     inner = (1 - share) * chords[:-1] + share * chords[1:]
     return np.concatenate([[2 * chords[0] - inner[0]], inner, [2 * chords[-1] - inner[-1]]])
+
+
+def _between_corners(values: Array, lengths: Array) -> list[_Ends]:
+    """A quantity at both ends of each piece of a part that begins or ends at a corner.
+
+    From there it may go as a root, as a radius of contact does: slopes are small enough for cubics not to swing beyond their ends.
+    """
+    slopes, chords = slopes_of(values, lengths), np.diff(values) / lengths
+    for k, own in enumerate(slopes):
+        beside = chords[max(k - 1, 0) : k + 1]
+        most = _STEEPEST * np.abs(beside).min()
+        if (beside * beside[0] >= 0).all() and abs(own) > most:
+            slopes[k] = np.copysign(most, beside[0])
+    return list(zip(values[:-1], values[1:], slopes[:-1], slopes[1:], strict=True))
 
 
 def _steps(points: Sequence[CurvePoint], lengths: Array) -> Array:

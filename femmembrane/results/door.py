@@ -6,12 +6,13 @@ Records stand below these rooms. They go up here alone, when one of their method
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..potential import Array, Evaluation, Potential
+    from ..potential import Array, Potential
     from ..scene import Scene
     from ..solve.controls import Control, Gas
     from ..solve.sensitivity import Rates, Sensitive
@@ -50,20 +51,12 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     return profile_at(scene, x, pressure, s)
 
 
-def checked_verdict(
-    potential: Potential,
-    x: Array,
-    pressure: float,
-    evaluation: Evaluation,
-    control: str | None,
-    azimuthal: int | str,
-    guess: Array | None = None,
-    compliance: float | None = None,
-) -> Verdict:
-    """See :func:`femmembrane.stability.checked_verdict.checked_verdict`."""
+@cache
+def checked_verdict() -> Callable[..., Verdict]:
+    """:func:`femmembrane.stability.checked_verdict.checked_verdict`, looked up once, as a branch asks at every step."""
     from ..stability.checked_verdict import checked_verdict
 
-    return checked_verdict(potential, x, pressure, evaluation, control, azimuthal, guess=guess, compliance=compliance)
+    return checked_verdict
 
 
 def natural_frequencies(potential: Potential, x: Array, pressure: float, n: int, count: int, control: str) -> tuple[Vibration, ...]:
@@ -275,6 +268,13 @@ def branch_html(branch: Branch) -> str:
     return branch_html(branch)
 
 
+def tipped_html(branch: TippedBranch) -> str:
+    """See :func:`femmembrane.views.notebook.tipped_html`."""
+    from ..views.notebook import tipped_html
+
+    return tipped_html(branch)
+
+
 def equilibrium_html(equilibrium: Equilibrium) -> str:
     """See :func:`femmembrane.views.notebook.equilibrium_html`."""
     from ..views.notebook import equilibrium_html
@@ -310,7 +310,7 @@ def error_estimate_html(estimate: ErrorEstimate) -> str:
     return error_estimate_html(estimate)
 
 
-def study_html(study: Convergence | Cost | Sweep, label: str) -> str:
+def study_html(study: Convergence | Cost | Sweep | Fit, label: str) -> str:
     """See :func:`femmembrane.views.notebook.study_html`."""
     from ..views.notebook import study_html
 

@@ -284,14 +284,18 @@ class Equilibrium:
         InputError
             For an unknown control, or for arguments that do not go together.
         """
+        key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
+        named = control is None or isinstance(control, str)
+        if electric is None and named and isinstance(azimuthal, (int, str)) and key in self._answers:
+            known: Verdict = self._answers[key]
+            return known
         counted = isinstance(azimuthal, (int, np.integer)) or (isinstance(azimuthal, str) and azimuthal == ALL)
-        if not (control is None or isinstance(control, str)) or not counted:
+        if not named or not counted:
             raise InputError(
                 "control" if counted else "azimuthal", control or azimuthal, 'a name and a number are allowed, or azimuthal="all"'
             )
         if gas is not None and control != "gas":
             raise InputError("gas", gas, 'allowed with control "gas" only')
-        key: Key = ("verdict", control, azimuthal) if gas is None else ("verdict", control, azimuthal, gas)
         if control == "gas" and gas is None:
             gas = self.enclosed
         if electric is None:
@@ -327,7 +331,7 @@ class Equilibrium:
     def _judged(self, potential: Potential, control: str | None, azimuthal: int | str, gas: Gas | None) -> Verdict:
         evaluation = potential.evaluate(self.state, self.pressure)
         compliance = gas.compliance(self.volume) if gas else None
-        return door.checked_verdict(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
+        return door.checked_verdict()(potential, self.state, self.pressure, evaluation, control, azimuthal, compliance=compliance)
 
     @one_thread
     def frequencies(self, *, azimuthal: int = 0, count: int = 3, control: str = "pressure") -> tuple[Vibration, ...]:

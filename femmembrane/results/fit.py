@@ -195,6 +195,17 @@ class Fit:
     evaluations: int = field(repr=False)
     samples: Mapping[str, Array] = field(default_factory=dict, repr=False)
 
+    def _repr_html_(self) -> str:
+        """Data and fitted curve above the numbers, for notebooks."""
+        return door.study_html(self, "Measured and fitted")
+
+    @property
+    def summary(self) -> str:
+        """The numbers with their standard errors, and whether they are determined, in a line."""
+        units = {name: f" {unit}" if unit else "" for name, unit in self.units.items()}
+        found = [f"{name} = {self.values[name]:.6g} +- {self.standard_errors[name]:.2g}{units[name]}" for name in self.parameters]
+        return f"{', '.join(found)} ({'determined' if self.determined else 'not determined'})"
+
     def __str__(self) -> str:
         width = max(9, *(len(name) for name in self.parameters))
         lines = [f"{'parameter':<{width}} {'value':>12} {'error':>8}  95 % interval"]

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..origin import package_version
 from ..quantities import PLACES, Converter, in_si, quantity
+from .identities import FAMILIES, with_identities
 from .netcdf import read_dataset, reason, write_dataset
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ DIMENSIONS: Mapping[str, str] = {
     **{f"{tag}{name}": dim for tag, (dim, _, _) in _FAMILIES.items() for name in PLACES},
     **dict.fromkeys(("steps", "limit_points", "volume_folds", "azimuthal_onsets"), ""),
     "onset_waves": "onset",
+    **{f"{tag}{what}": _FAMILIES[tag][0] for tag in FAMILIES for what in ("identity", "cut")},
     "wrinkled_fraction": "step",
     **dict.fromkeys(("largest_wrinkled_fraction", "equilibria", "stable_equilibria"), ""),
     "state_energy": "state",
@@ -106,7 +108,7 @@ def dataset_of(
     variables["seconds"] = dims, np.array([r.seconds for r in rows]).reshape(shape), {"long_name": "wall time of the scene", "units": "s"}
     about = {"title": "femmembrane sweep", "femmembrane_version": package_version(), **facts}
     coordinates = {key: _labels(values) for key, values in over.items()}
-    return xarray.Dataset(variables, coords=coordinates, attrs=about)
+    return with_identities(xarray.Dataset(variables, coords=coordinates, attrs=about), dims)
 
 
 def save_dataset(dataset: xarray.Dataset, path: str | PathLike[str]) -> None:

@@ -20,13 +20,15 @@ from ..kernels import kernels
 from ..origin import NOTED_VERSIONS, package_version
 from . import door
 from .analyses import asked, registered
+from .branch import Branch
 from .checkpoint import scene_difference
 from .netcdf import reason
 from .store import save
 from .table import write_csv, write_special_points_csv
+from .tipped_store import write_points_csv
 
 if TYPE_CHECKING:
-    from .branch import Branch
+    from .tipped import TippedBranch
 
 #: the record of a run, which makes its folder complete
 RECORD = "run.json"
@@ -98,6 +100,46 @@ def write_run(
         first = next(iter(failed.values()))
         raise NotWrittenError(first.strerror or str(first), failed) from first
     return [folder / name for name in names if name in writers]
+
+
+def write_tipped_run(branch: TippedBranch, directory: str | os.PathLike[str], command: str | None = None) -> list[Path]:
+    """Write everything that is known of a branch with waves around the axis to a folder, with the names that a run has.
+
+    Files of an earlier run in the folder are removed.
+
+    Parameters
+    ----------
+    branch : TippedBranch
+    directory : path
+        Made when it does not exist.
+    command : str, optional
+        The command that asked for it, for ``run.json``.
+
+    Returns
+    -------
+    list of Path
+        The files written, VTU files not listed one by one.
+
+    Raises
+    ------
+    InputError
+        When the folder cannot be made or written to.
+    """
+    folder = _writable(Path(directory))
+    refuse_obstacles(folder, run_files(), (SURFACES_FOLDER,))
+    for stale in run_files():
+        (folder / stale).unlink(missing_ok=True)
+    door.remove_surfaces(folder / SURFACES)
+    writers: dict[str, Callable[[Path], object]] = {"branch.nc": branch.save, "branch.csv": branch.to_csv}
+    if branch.special_points is not None:
+        writers["special_points.csv"] = partial(write_points_csv, branch)
+    writers[DIAGRAMS[0]] = branch.plot
+    if branch.scene.vtu:
+        writers[SURFACES] = branch.to_vtk
+    writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
+    for name, write in writers.items():
+        write(folder / name)
+    return [folder / name for name in run_files() if name in writers]
 
 
 def read_record(folder: Path) -> dict[str, Any] | None:
@@ -220,13 +262,13 @@ def _writable(folder: Path) -> Path:
     return folder
 
 
-def _facts(branch: Branch, command: str | Sequence[str] | None) -> dict[str, Any]:
+def _facts(branch: Branch | TippedBranch, command: str | Sequence[str] | None) -> dict[str, Any]:
     """The record of a run: what was asked, on which machine, and how it ended."""
     return {
         "scene": branch.scene.record(),
         "command": command if command is None or isinstance(command, str) else list(command),
-        **({"mesh": branch.mesh_used} if branch.mesh_used else {}),
-        **({"notes": list(branch.notes)} if branch.notes else {}),
+        **({"mesh": branch.mesh_used} if isinstance(branch, Branch) and branch.mesh_used else {}),
+        **({"notes": list(branch.notes)} if isinstance(branch, Branch) and branch.notes else {}),
         "status": branch.status.value,
         "message": branch.message,
         "equilibria": len(branch),

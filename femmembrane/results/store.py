@@ -42,13 +42,26 @@ from .stored_points import (
     special_variables,
 )
 from .table import columns, rows
+from .tipped_store import WAVES, tipped_attributes, tipped_of, tipped_variables
 
 if TYPE_CHECKING:
     import xarray
 
+    from .tipped import TippedBranch
+
 FORMAT = 1
 #: attribute of files that count the volume that a membrane encloses as positive wherever it is; before, one with its inside above did not
 _INSIDE = ("inside", "where the membrane encloses a volume, below where it is flat")
+
+
+def tipped_to_xarray(branch: TippedBranch) -> xarray.Dataset:
+    """A branch with waves around the axis as one data set: the columns of the table, the states and the special points."""
+    import xarray
+
+    described = {name: (dims, data, _describe(name)) for name, (dims, data) in tipped_variables(branch).items()}
+    step = described.pop("step")
+    about = {**_common_attributes(branch, "Equilibria of a membrane with waves around the axis"), **tipped_attributes(branch)}
+    return xarray.Dataset(described, coords={"step": step}, attrs=about)
 
 
 def to_xarray(branch: Branch) -> xarray.Dataset:
@@ -78,7 +91,17 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
 
 def save(branch: Branch, path: str | PathLike[str], facts: Mapping[str, str] | None = None) -> None:
     """Write a branch to a NetCDF file, from which :func:`load` brings it back to the last bit; ``facts`` are further attributes of it."""
-    dataset = to_xarray(branch).assign_attrs(facts or {})
+    _write(to_xarray(branch).assign_attrs(facts or {}), path)
+
+
+def save_tipped(branch: TippedBranch, path: str | PathLike[str]) -> None:
+    """Write a branch with waves around the axis to a NetCDF file, from which :func:`load` brings it back to the last bit."""
+    if not len(branch):
+        raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
+    _write(tipped_to_xarray(branch), path)
+
+
+def _write(dataset: xarray.Dataset, path: str | PathLike[str]) -> None:
     encoding = {
         str(name): {"_FillValue": None, **({"zlib": True, "complevel": 1, "shuffle": True} if variable.ndim == 2 and variable.size else {})}
         for name, variable in dataset.variables.items()
@@ -87,19 +110,19 @@ def save(branch: Branch, path: str | PathLike[str], facts: Mapping[str, str] | N
     write_dataset(dataset, path, encoding)
 
 
-def load(path: str | PathLike[str], *, scene: Scene | None = None) -> Branch:
+def load(path: str | PathLike[str], *, scene: Scene | None = None) -> Any:
     """Bring a saved branch back, without solving anything.
 
     Parameters
     ----------
     path : path
-        A file that :meth:`Branch.save` or a run wrote, or the folder of a run.
+        A file that :meth:`Branch.save`, :meth:`TippedBranch.save` or a run wrote, or the folder of a run.
     scene : Scene, optional
         For a scene with materials, sources, shapes or functions of your own: where these come from. A data file imports nothing.
 
     Returns
     -------
-    Branch
+    Branch or TippedBranch
         Equal to the saved one to the last bit.
 
     Raises
@@ -123,7 +146,24 @@ def load(path: str | PathLike[str], *, scene: Scene | None = None) -> Branch:
         path = join(path, "branch.nc")
         if not exists(path):
             raise InputError("path", str(path), "there is no branch.nc in this folder: the folder of a run is allowed")
-    return branch_of(read_branch_file(path), path, scene)
+    dataset = read_branch_file(path)
+    return (tipped_branch_of if WAVES in dataset.attrs else branch_of)(dataset, path, scene)
+
+
+def tipped_branch_of(dataset: xarray.Dataset, path: str | PathLike[str], own: Scene | None = None) -> TippedBranch:
+    """The branch with waves of the data set that :func:`read_branch_file` read.
+
+    Raises
+    ------
+    InputError
+        When it is not complete.
+    """
+    try:
+        return tipped_of(dataset, scene_from_text(dataset.attrs["scene"], own))
+    except MissingPartError:
+        raise
+    except Exception as error:  # there is nothing that a file nobody wrote in this way could not lead to
+        raise InputError("path", str(path), f"a complete file written by femmembrane is needed ({reason(error)})") from error
 
 
 def branch_of(dataset: xarray.Dataset, path: str | PathLike[str], own: Scene | None = None) -> Branch:
@@ -187,19 +227,25 @@ def _describe(name: str) -> dict[str, str]:
     return {"long_name": known.meaning + where, "units": known.unit}
 
 
-def _attributes(branch: Branch) -> dict[str, Any]:
+def _common_attributes(branch: Branch | TippedBranch, title: str) -> dict[str, Any]:
     return {
-        "title": branch.scene.title or "Equilibria of an inflated membrane",
+        "title": branch.scene.title or title,
         "femmembrane_version": package_version(),
         "format": FORMAT,
         _INSIDE[0]: _INSIDE[1],
         "status": branch.status.value,
         "message": branch.message,
+        "timings": json.dumps(dict(branch.timings)),
+        "scene": scene_text(branch.scene),
+    }
+
+
+def _attributes(branch: Branch) -> dict[str, Any]:
+    return {
+        **_common_attributes(branch, "Equilibria of an inflated membrane"),
         **({"solver": branch.solver} if branch.solver else {}),
         **({"remarks": json.dumps(branch.remarks)} if branch.remarks else {}),
         **({"over": branch.over, "hold": json.dumps(dict(branch.hold))} if branch.over else {}),
-        "timings": json.dumps(branch.timings),
-        "scene": scene_text(branch.scene),
         **memory_attributes(branch.memory),
     }
 

@@ -140,7 +140,8 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
         states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
         for k, own in enumerate(ends):
             if not np.array_equal(own, scene.mesh.breakpoints()):
-                on_branch[k], scenes[k] = states_there[k], scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, own))
+                there = scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, own))
+                on_branch[k], scenes[k] = states_there[k], there.bordered(scenes[k].borders)
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},

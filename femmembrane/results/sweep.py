@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..scene.own import MissingPartError
 from . import door
 from .grid import load_dataset, save_dataset
+from .identities import numbered_in_words
 from .store import scene_from_text
 
 if TYPE_CHECKING:
@@ -59,7 +60,15 @@ class Sweep:
         keys = ", ".join(f"{key} ({len(values)} values)" for key, values in self.over.items())
         statuses, counts = np.unique(self._dataset["status"].values, return_counts=True)
         lines = [f"{len(self)} scenes over {keys}: {self.quantity}"]
-        return "\n".join(lines + [f"{count:>8} {status}" for status, count in zip(statuses, counts, strict=True)])
+        lines += [f"{count:>8} {status}" for status, count in zip(statuses, counts, strict=True)]
+        return "\n".join([*lines, *numbered_in_words(self._dataset)])
+
+    @property
+    def summary(self) -> str:
+        """How many scenes there are and how they ended, in a line."""
+        statuses, counts = np.unique(self._dataset["status"].values, return_counts=True)
+        ended = ", ".join(f"{count} {status}" for status, count in zip(statuses, counts, strict=True))
+        return f"{len(self)} scene{'s' if len(self) > 1 else ''} ({ended})"
 
     @property
     def failed(self) -> int:
@@ -121,8 +130,9 @@ class Sweep:
         ax : matplotlib Axes, optional
             Where to draw one variable, the first of ``show``; the answer is then these axes.
         show : sequence of str, optional
-            Variables of the data set. A variable with several values a scene is named with its place, as ``limit_pressure.1``. Default: the
-            most telling variables of the quantity.
+            Variables of the data set. Of special points ``limit_pressure#2`` is the one with this number in all scenes, and
+            ``limit_pressure.1`` the second of each branch; over one key ``limit_pressure`` shows all. Other variables with several values
+            a scene are named with a place, as ``pressure.0``. Default: the most telling variables of the quantity.
         units : {"scaled", "si"}
             Of volumes, pressures and heights: those of the package, or SI units by the scales.
 

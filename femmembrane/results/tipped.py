@@ -266,6 +266,32 @@ class TippedBranch(Sequence[TippedEquilibrium]):
         """
         files.write_csv(path, self.columns, zip(*(self.column(name).tolist() for name in self.columns), strict=True))
 
+    def to_xarray(self) -> Any:
+        """Everything as one xarray data set, as :meth:`save` writes it."""
+        from .store import tipped_to_xarray
+
+        return tipped_to_xarray(self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the branch to a NetCDF file, whole or not at all; :func:`femmembrane.load` brings it back to the last bit.
+
+        Parameters
+        ----------
+        path : path
+
+        Raises
+        ------
+        InputError
+            For a branch without equilibria, and when the file cannot be written.
+        """
+        from .store import save_tipped
+
+        save_tipped(self, path)
+
+    def _repr_html_(self) -> str:
+        """Its diagram and a table, for notebooks."""
+        return door.tipped_html(self)
+
     def to_vtk(self, path: str | PathLike[str]) -> list[Path]:
         """Write a VTU file for each equilibrium, and the PVD file that strings them together: a movie for ParaView.
 

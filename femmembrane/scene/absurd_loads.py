@@ -1,4 +1,6 @@
-"""A remark on loads that no membrane of this size and stiffness holds: most often they were meant in other units."""
+"""Remarks on numbers that were most often meant in other units: loads that no membrane of this size and stiffness holds, and scales of a
+sheet that is no membrane.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +13,7 @@ from ..quantities import heading, readable
 from .run import Run
 
 if TYPE_CHECKING:
+    from ..physics.scales import Scales
     from .value import Scene
 
 #: a load is remarkable from so many times what the sheet holds: a pressure of mu T over its size, a stretch in all directions
@@ -21,6 +24,31 @@ _LIMIT = {
     "volume": "the size of the membrane, in all directions",
     "center_height": "the size of the membrane",
 }
+
+
+#: thickness over radius of what is called a membrane, from films of 10 um on balloons of 10 m to a disc as thick as its radius
+_THIN, _THICK = 1e-6, 1.0
+#: shear moduli in Pa, from gels that hardly stand to steel
+_SOFT, _STIFF = 1.0, 2e11
+#: radii in m, from a cell to a balloon for the stratosphere
+_SMALL, _LARGE = 1e-7, 200.0
+
+
+def remarks_on_scales(scales: Scales | None) -> tuple[str, ...]:
+    """What is remarkable about the scales of a scene: numbers in mm, in MPa or without a unit that are read as m and Pa."""
+    if scales is None:
+        return ()
+    meant = 'numbers of [scales] without a unit are in m and Pa; "25 mm" and "0.4 MPa" are understood too'
+    told = []
+    if not _SMALL <= scales.radius <= _LARGE:
+        told.append(f"scales.radius = {scales.radius:g} m")
+    if not _THIN <= scales.thickness / scales.radius <= _THICK:
+        told.append(
+            f"scales.thickness = {scales.thickness:g} m is {scales.thickness / scales.radius:.3g} times the radius, {scales.radius:g} m"
+        )
+    if not _SOFT <= scales.shear_modulus <= _STIFF:
+        told.append(f"scales.shear_modulus = {scales.shear_modulus:g} Pa")
+    return (f"{'; '.join(told)}: no membrane is known like this; {meant}",) if told else ()
 
 
 def remarks_on_loads(scene: Scene) -> tuple[str, ...]:
@@ -37,6 +65,18 @@ def remarks_on_loads(scene: Scene) -> tuple[str, ...]:
         if abs(load) > limits.get(quantity, np.inf):
             return (_remark(scene, key, quantity, load),)
     return ()
+
+
+def remarks_on_direction(scene: Scene) -> tuple[str, ...]:
+    """A remark on a branch that sets out away from the only volume at which it is to end: it arrives there if it turns back, or never."""
+    run = scene.run
+    if run is None or run.control != "arc-length" or run.over or run.start is None or set(run.until or {}) != {"volume"}:
+        return ()
+    end, way = (run.until or {})["volume"], run.direction or 1
+    if (end - run.start) * way >= 0:
+        return ()
+    begun = f"it sets out from V = {run.start:g}, away from run.until.volume = {end:g}"
+    return (f"run.direction = {way}: {begun}; {-way} sets out the other way",)
 
 
 def _loads(run: Run) -> Iterator[tuple[str, str, float]]:

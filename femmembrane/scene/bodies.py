@@ -28,11 +28,10 @@ def check_obstacles(scene: Scene, lift: Lift | None) -> None:
     Raises
     ------
     InputError
-        For an obstacle that cuts or touches the membrane at rest, for two that overlap, and for what is not done before an obstacle.
+        For an obstacle that cuts or touches the membrane at rest, and for two that overlap.
     """
     from .toml import item_path
 
-    _refuse_effects(scene)
     ends = scene.mesh.breakpoints()
     s = np.interp(np.arange(_EACH * (len(ends) - 1) + 1) / _EACH, np.arange(len(ends)), ends)
     R, Z = (np.array(part, dtype=float) for part in scene.mesh.position(s))
@@ -48,7 +47,9 @@ def check_obstacles(scene: Scene, lift: Lift | None) -> None:
     paths += ["source.body"] * (len(scene.bodies) - len(paths))
     for path, body in zip(paths, scene.bodies, strict=True):
         gap = body.gap(R, Z)
-        if not (gap[inner].min() > 0 and gap.min() >= -LEAST_LENGTH * size):
+        if scene.squeezed:  # the ends that are held alone stay where they are
+            inner, gap = np.zeros(s.size, dtype=bool), np.where(inner, np.abs(gap), gap)
+        if not (gap[inner].min(initial=np.inf) > 0 and gap.min() >= -LEAST_LENGTH * size):
             raise InputError(path, body.label(), _in_the_way(body, gap, R, Z))
     for k, one in enumerate(scene.bodies):
         for j, other in enumerate(scene.bodies):
@@ -70,18 +71,3 @@ def _enters(one: Obstacle, other: Obstacle, size: float) -> bool:
     points = np.concatenate([np.linspace(line[:, :-1], line[:, 1:], 9).transpose(1, 0, 2).reshape(2, -1) for line in lines], axis=1)
     points = points[:, points[0] >= 0]
     return bool(points.size) and float(other.gap(*points).min()) < -1e-9 * size
-
-
-def _refuse_effects(scene: Scene) -> None:
-    """Refuse what is not computed before an obstacle."""
-    key = "obstacle"
-    if scene.tension_field:
-        raise InputError("effects.tension_field", True, "false is allowed with an obstacle: wrinkles against a body are not computed")
-    if scene.electric is not None and scene.electric.total_charge is not None:
-        raise InputError("electric.total_charge", scene.electric.total_charge, "a voltage is allowed with an obstacle")
-    if scene.bending:
-        raise InputError("effects.bending", True, "false is allowed with an obstacle: bending against a body is not computed")
-    if scene.open:
-        raise InputError("mesh.accuracy", getattr(scene.mesh, "accuracy", None), "elements and degree are to be given with an obstacle")
-    if scene.run is not None and getattr(scene.run, "number", None) is not None:
-        raise InputError("run.over" if scene.run.over else "run.control", scene.run.number, f"not over a number beside an {key}")

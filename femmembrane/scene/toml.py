@@ -110,7 +110,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
     "mesh": ("degree", "follow_zones"),
-    "effects": ("tension_field", "demagnetization", "bending"),
+    "effects": ("tension_field", "demagnetization", "bending", "squeezed"),
     "output": ("vtu",),
 }
 #: attributes of Scene that may be functions along the meridian

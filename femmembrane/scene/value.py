@@ -112,6 +112,9 @@ class Scene:
         scales, and elements of degree 2 or higher.
     obstacles : sequence of Obstacle
         Rigid, axisymmetric, frictionless bodies such as ``Plane(height=0.5)``. Without a body nothing of contact is built.
+    squeezed : bool
+        Whether obstacles may cut the membrane at rest, as plates that close on a balloon do. Runs over a number of an obstacle set it where
+        they come to such scenes; others have no state to start from, and take a ``start``.
     vtu : bool
         Whether a run writes surfaces for ParaView to its folder, most of what is in it. They change no number.
     borders : tuple of (int, float)
@@ -164,6 +167,7 @@ class Scene:
     #: whether R0/T was given, by itself or by scales
     _thickness_given: ClassVar[bool] = False
     obstacles: tuple[Obstacle, ...] = ()
+    squeezed: bool = field(default=False, repr=False)
     vtu: bool = field(default=True, repr=False)
     borders: tuple[tuple[int, float], ...] = field(default=(), repr=False, metadata={"found": True})
 
@@ -199,6 +203,7 @@ class Scene:
         store(
             self,
             bending=bending,
+            squeezed=switch("effects.squeezed", self.squeezed),
             vtu=switch("output.vtu", self.vtu),
             degree=_degree("mesh.degree", self.degree, self.open),
             sources=sources,

@@ -3,6 +3,7 @@
 ======================== ==================================================================================================
 ``source.K.NAME``        a number of source K (from 0): ``source.0.strength``, ``source.0.height``
 ``load.K.NAME``          a number of load K: ``load.0.gamma``
+``obstacle.K.NAME``      a number of obstacle K: ``obstacle.0.height``
 ``electric.NAME``        what is given of ``electric.voltage``, ``electric.total_charge`` and ``electric.frozen_charge``
 ``membrane.susceptibility``  chi; ``membrane.saturation`` and ``membrane.remanence``, where they are numbers
 ``membrane.prestretch``  p of a flat disc or annulus, or of a tube
@@ -37,6 +38,7 @@ from ..physics.materials import Ogden
 
 if TYPE_CHECKING:
     from ..discretization.meridian import Meridian
+    from ..physics.obstacles import Obstacle
     from .value import Scene
 
 #: added to a strength, so that its square root can be differentiated at zero; strengths above 1e-284 do not change
@@ -67,7 +69,7 @@ _POWERS: Mapping[str, tuple[float, float]] = {
     "electric_field": (0.0, 0.5),
 }
 #: parts of a scene that are lists, by their names
-_LISTS = {"source": "sources", "load": "loads"}
+_LISTS = {"source": "sources", "load": "loads", "obstacle": "obstacles"}
 #: parts of a scene that are objects of their own
 _OBJECTS = ("electric", "chamber")
 
@@ -143,9 +145,15 @@ class Parameter:
                 self._check_modulus(value, material.alpha[int(rest[3:])])
             return self.scene.replace(material=dataclasses.replace(material, **self._material_numbers(rest, value)))
         index, name = int(rest.partition(".")[0]), rest.partition(".")[2]
-        if part == "load":
-            changed = dataclasses.replace(self.scene.loads[index], **{name: value})  # type: ignore[type-var]  # a dataclass, by its name
-            return self.scene.replace(loads=(*self.scene.loads[:index], changed, *self.scene.loads[index + 1 :]))
+        if part in ("load", "obstacle"):
+            owners: Any = getattr(self.scene, _LISTS[part])
+            changed = {_LISTS[part]: (*owners[:index], dataclasses.replace(owners[index], **{name: value}), *owners[index + 1 :])}
+            try:
+                return self.scene.replace(**changed)
+            except InputError:
+                if part == "load" or self.scene.squeezed:
+                    raise
+            return self.scene.replace(**changed, squeezed=True)
         sources: list[Any] = list(self.scene.sources)
         sources[index] = dataclasses.replace(sources[index], **{name: value})
         scales = self.scene.scales
@@ -167,7 +175,7 @@ class Parameter:
     def _put(self, parts: SimpleNamespace, value: Any) -> None:
         """Change parts of the scene to those at a value; of a number that is not one of the material."""
         scene, (part, _, rest) = self.scene, self.name.partition(".")
-        if part == "chamber":  # of the control, and of no potential
+        if part in ("chamber", "obstacle"):  # of the control, or of what stands in the way, and of no potential
             return
         if part == "electric":
             given: Any = scene.electric
@@ -203,6 +211,30 @@ class Parameter:
     def moves(self) -> bool:
         """Whether it moves an end of the membrane."""
         return self.name.startswith("mesh.") or self.name == "membrane.prestretch"
+
+    @property
+    def shapes(self) -> bool:
+        """Whether it moves a rigid body, or changes the shape of one."""
+        part, place, *_ = self.name.split(".")
+        return part == "obstacle" or (part == "source" and getattr(self.scene.sources[int(place)], "obstacle", None) is not None)
+
+    def bodies_at(self, value: float) -> tuple[Obstacle, ...]:
+        """The rigid bodies at a value, which are not checked against the membrane or each other.
+
+        Raises
+        ------
+        InputError
+            For a value that a body cannot have.
+        """
+        if not self.shapes:
+            return self.scene.bodies
+        part, place, name = self.name.split(".", 2)
+        owners: Any = list(getattr(self.scene, _LISTS[part]))
+        owners[int(place)] = dataclasses.replace(owners[int(place)], **{name: value})
+        if part == "obstacle":
+            return (*owners, *self.scene.bodies[len(owners) :])
+        brought = (getattr(source, "obstacle", None) for source in owners)
+        return (*self.scene.obstacles, *(body for body in brought if body is not None))
 
     def rates(self) -> dict[str, float]:
         """How numbers of the scene change with this one, by their names: by 1 for each unit, and those of a material that go with it."""
@@ -390,6 +422,7 @@ def names(scene: Scene) -> list[str]:
     """Names of all numbers of a scene that can be varied."""
     found = [f"source.{k}.{name}" for k, source in enumerate(scene.sources) for name in _numbers(source)]
     found += [f"load.{k}.{name}" for k, load in enumerate(scene.loads) for name in _numbers(load)]
+    found += [f"obstacle.{k}.{name}" for k, body in enumerate(scene.obstacles) for name in _numbers(body)]
     if scene.electric is not None:
         found.append(f"electric.{scene.electric.load}")
     if scene.sources:
@@ -431,7 +464,10 @@ def _named(scene: Scene, name: str) -> Parameter:
 
 def _parts(scene: Scene) -> SimpleNamespace:
     """The parts of a scene that formulas use."""
-    kept = ("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", "material", "sources", "loads")
+    kept = (
+        *("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", "material", "sources", "loads"),
+        *("bodies", "borders"),
+    )
     found = {name: getattr(scene, name) for name in ("susceptibility", "electricity", *MAGNETISATION, *kept)}
     return SimpleNamespace(**found)
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Status
-from ..physics.loads import over_projection
 from ..potential import Array, Potential
 from .controls import ArcLengthControl, CarriedArcLength, Control
 
@@ -45,14 +45,16 @@ _FEWEST = 2
 _MOST_PASSES, _NEXT = 8, 2
 #: how far beyond the middle between two ends a border may be, over the size of an element, before the other one follows it
 _BEYOND = 0.02
+#: relative difference of curvatures that are the same
+_SAME_CURVATURE = 1e-6
 #: forces that pull, over the largest, and gaps inside a body, over the size of the membrane, that a border in its place may leave
 _PULL, _INSIDE = 1e-3, 1e-6
 
 
 class Once(Protocol):
-    """A corrector on a smooth potential."""
+    """A corrector on a smooth potential; ``damped`` for a guess that is not next to a solution."""
 
-    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float) -> NewtonResult: ...
+    def __call__(self, potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = ...) -> NewtonResult: ...
 
 
 def settled(once: Once, control: Control, potential: Potential, x: Array, pressure: float, magnetic: float) -> NewtonResult:
@@ -93,8 +95,15 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
         result = once(root.holding(held), control=control, x=x, pressure=pressure)
         spent += result.iterations
         result.iterations = spent
+        if result.status is not Status.CONVERGED and len(tried) > 1:  # the solution on the set before need not be next to this one
+            result = once(root.holding(held), control=control, x=x, pressure=pressure, damped=True)
+            result.iterations = spent = spent + result.iterations
         if result.status is not Status.CONVERGED:
-            return result
+            smoother = [s for s in (_smoothed(root, held, True), _smoothed(root, held, False)) if s.tobytes() not in tried]
+            if not smoother or len(tried) == MOST_SETS:
+                return result
+            held = smoother[0]
+            continue
         evaluation = cast("ContactEvaluation", result.evaluation)
         following = root.judged(evaluation._raw, evaluation.gaps, result.pressure)
         if (following == held).all():
@@ -105,6 +114,15 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
             result.status = Status.NOT_CONVERGED
             return result
         x, pressure, held = result.x, result.pressure, following
+
+
+def _smoothed(root: ContactPotential, held: Mask, fill: bool) -> Mask:
+    """A set without holes shorter than an element, or without zones as short: a guess next to a border may have them from round-off."""
+    new, at = held.copy(), np.flatnonzero(held == fill)
+    for one, other in zip(at[:-1], at[1:], strict=True):
+        if 1 < other - one <= root.space.degree and root.nodes[other] - root.nodes[one] == other - one:
+            new[one + 1 : other] = fill
+    return new
 
 
 def _one_changed(evaluation: ContactEvaluation, held: Mask, following: Mask) -> Mask:
@@ -129,13 +147,15 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
     """The equilibrium with ends of elements at the borders of contact; None where there are none that ends could follow."""
     evaluation = cast("ContactEvaluation", result.evaluation)
     zones = [(zone, np.array(_estimates(root, evaluation, zone))) for zone in zones_of(root, evaluation.held)]
-    followed = [(zone, places) for zone, places in zones if places.size and _assigned(root, [zone], places) is not None]
+    zones = [(zone, places) for zone, places in zones if places.size and _smooth_about(root, evaluation, zone)]
+    followed = [(zone, places) for zone, places in zones if _assigned(root, [zone], places) is not None]
     if not followed or _assigned(root, [z for z, _ in followed], np.concatenate([s for _, s in followed])) is None:
         return None
     own, places = [zone for zone, _ in followed], np.concatenate([s for _, s in followed])
     # other zones, of a node or two, stay as sets of nodes
     loose = evaluation.held & ~_within(root, own)
     spent, x, pressure = result.iterations, result.x, result.pressure
+    tried: list[list[Border]] = []
     for _ in range(_MOST_PASSES):
         borders = _assigned(root, own, places)
         if borders is None:
@@ -151,8 +171,10 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
         following = potential.judged(evaluation._raw, evaluation.gaps, result.pressure) & ~_within(root, own, _NEXT * root.space.degree)
         again = _assigned(root, own, places)
         same = again is None or all(a == b or _between(root, a, b, s) for a, b, s in zip(again, borders, places, strict=True))
-        if same and (following == loose).all():
+        # on a coarse mesh each of two ends may say that the border belongs to the other one
+        if (same or again in tried) and (following == loose).all():
             return result if _in_place(evaluation) else None
+        tried.append(borders)
         x, pressure, loose = evaluation.carried(result.x), result.pressure, following
     return None
 
@@ -178,6 +200,21 @@ def _sides(root: ContactPotential, zone: tuple[int, int]) -> list[bool]:
     """The borders of a zone: False for that at its beginning, True for that at its end; an end of the meridian is none."""
     known = set(root.nodes.tolist())
     return [side for side, beyond in ((False, zone[0] - 1), (True, zone[1] + 1)) if beyond in known]
+
+
+def _smooth_about(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> bool:
+    """Whether bodies have one curvature about each border of a zone. Where it jumps inside an element, as at the end of a rounded edge, the
+    error of the mesh depends on where the ends are: a border that they follow would follow that error.
+    """
+    gaps, reach = evaluation.gaps, root.space.degree
+    for side in _sides(root, zone):
+        edge = zone[1] if side else zone[0]
+        near = np.abs(root.nodes - edge) <= reach
+        curvature = gaps.curvature[near] / (1 - gaps.gap[near] * gaps.curvature[near])  # that of the body itself
+        size = float(np.abs(curvature).max())
+        if float(np.ptp(curvature)) > _SAME_CURVATURE * size:
+            return False
+    return True
 
 
 def _estimates(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> list[float]:
@@ -309,18 +346,74 @@ def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
     """Forces along the normal of the elements beyond the borders, over the largest forces that meet at a node."""
     evaluation = cast("ContactEvaluation", result.evaluation)
     potential, space = cast("ContactPotential", evaluation.potential), evaluation.potential.space
-    density = evaluation.force_density.reshape(2, 4 * space.n_quadrature, space.n_elements)
     scales = evaluation.force_scale(result.pressure)
     found = []
     for border in borders:
-        element, local = (border.end, 0) if border.before else (border.end - 1, space.degree)
-        forces = space.table.T @ (density[0][:, element] - result.pressure * density[1][:, element])
         node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
         n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
-        along, across = _at_end(potential, evaluation, result.pressure, border)
+        along, across = _end_force(evaluation, result.pressure, border)
         scale = abs(n_rho) * scales[0] + abs(n_eta) * scales[1]
-        found.append(((forces[local] - along) * n_rho + (forces[space.degree + 1 + local] - across) * n_eta) / scale)
+        found.append((along * n_rho + across * n_eta) / scale)
     return np.array(found)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSide:
+    """The element beyond a border of contact, seen from the border.
+
+    Attributes
+    ----------
+    nodes : ndarray of int
+        Places of its nodes among those that bodies can hold.
+    slope : ndarray
+        What makes the derivative at the border, along the meridian, of values at these nodes.
+    bend : float
+        Second derivative of the gap there.
+    tension : float
+        Force across the circle over the deformed length for each unit of the parameter, positive where contact is before the border.
+    """
+
+    nodes: NDArray[np.int64]
+    slope: Array
+    bend: float
+    tension: float
+
+    def motion(self, gaps: Array) -> float:
+        """How far the border moves with a change of the gaps at all nodes: where the gap and its slope are zero."""
+        return -float(self.slope @ gaps[self.nodes]) / self.bend
+
+
+def free_sides(evaluation: ContactEvaluation, pressure: float) -> list[FreeSide]:
+    """The elements beyond the borders that ends of elements follow."""
+    potential = cast("ContactPotential", evaluation.potential)
+    degree, found = potential.space.degree, []
+    rho, eta = potential.positions(evaluation.x, evaluation.factor)
+    place = {int(node): k for k, node in enumerate(potential.nodes)}
+    for end, s in potential.borders:
+        before = not evaluation.held[place[end * degree + 1]]
+        step = 1 if before else -1
+        if degree == 1 or any(end * degree + j * step not in place for j in range(degree + 1)):
+            continue
+        nodes = np.array([place[end * degree + j * step] for j in range(degree + 1)])
+        h = potential.parameters[nodes[-1]] - s
+        powers = np.linalg.inv(np.vander((potential.parameters[nodes] - s) / h, increasing=True))
+        slope, bend = powers[1] / h, 2 * float(powers[2] @ evaluation.gaps.gap[nodes]) / h**2
+        pull = _end_force(evaluation, pressure, Border(end, before))
+        if bend > 0:
+            speed = np.hypot(slope @ rho[nodes], slope @ eta[nodes])
+            found.append(FreeSide(nodes, slope, bend, step * float(np.hypot(*pull) / speed)))
+    return found
+
+
+def _end_force(evaluation: ContactEvaluation, pressure: float, border: Border) -> tuple[float, float]:
+    """Force along rho and along z at the end of the element beyond a border."""
+    potential = cast("ContactPotential", evaluation.potential)
+    space = potential.space
+    density = evaluation.force_density.reshape(2, 4 * space.n_quadrature, space.n_elements)
+    element, local = (border.end, 0) if border.before else (border.end - 1, space.degree)
+    forces = space.table.T @ (density[0][:, element] - pressure * density[1][:, element])
+    along, across = _at_end(potential, evaluation, pressure, border)
+    return float(forces[local] - along), float(forces[space.degree + 1 + local] - across)
 
 
 def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure: float, border: Border) -> tuple[float, float]:
@@ -331,7 +424,7 @@ def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure
     space = potential.space
     rho, eta = space.end_position(evaluation.x, border.end)
     turn = 2 * np.pi * space.side * (-1.0 if border.before else 1.0)  # the element beyond the border begins, or ends, there
-    load = evaluation.factor * float(over_projection(potential.loads, np.array(eta))[0]) if potential.loads else 0.0
+    load = potential.edge_load(evaluation, eta)
     if space.lids:
         return turn * load * rho, turn * pressure * rho**2 / 2
     return turn * (load - pressure * eta) * rho, 0.0
@@ -383,5 +476,5 @@ def _pressed(evaluation: Any, body: int) -> float:
     held = evaluation.held & own
     if held.any():
         return float(np.abs(evaluation.forces[held]).sum())
-    rho, eta = evaluation.potential.positions(evaluation.x)
-    return -float(evaluation.potential.obstacles[body].gap(rho, eta).min())
+    potential, factor = evaluation.potential, evaluation.factor
+    return -float(potential.bodies_at(factor)[body].gap(*potential.positions(evaluation.x, factor)).min())

@@ -45,7 +45,8 @@ def negative_among(evaluation: Evaluation, constraint: Array | None = None) -> i
     kd, constraint = evaluation.potential.space.half_bandwidth, evaluation.reduced(constraint)
     if evaluation.spring is None:
         return negative_directions(evaluation.band, kd, constraint)
-    return bordered_count(evaluation.band, kd, np.column_stack([evaluation.spring, constraint]), np.array([-1.0, 0.0]))
+    spring = evaluation.reduced(evaluation.spring)
+    return bordered_count(evaluation.band, kd, np.column_stack([spring, constraint]), np.array([-1.0, 0.0]))
 
 
 def bordered_count(band: Array, half_bandwidth: int, borders: Array, corners: Array) -> int:

@@ -16,7 +16,8 @@ from .homotopy import Held, follow_homotopy
 from .newton import correct
 from .state import State, flat_state
 from .stepping import march
-from .ways import CORRECTIONS, along, from_guess, sound, well_posed
+from .ways import CORRECTIONS, along, caught, from_guess, sound, well_posed
+from .wellposed import is_slack
 
 if TYPE_CHECKING:
     from ..potential.contact import ContactPotential
@@ -131,6 +132,9 @@ def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
         state = None
         with suppress(SolveError):
             state = inflated(bare, first)
+        if state is not None and potential.scene.tension_field:
+            state = _off_bodies(potential, state)
+            first = first if state is None else state.volume
         if state is not None and potential.touching(state.x) > 0:
             break
         if first == rest:
@@ -143,7 +147,33 @@ def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
     if result.status is not Status.CONVERGED:
         raise SolveError(f"the membrane that touches no body at V = {first:.6g} was not found again", status=result.status)
     found = State.of(result, state.iterations)
-    return found if first == volume else march(potential, found, VolumeControl, first, volume, magnetic=0.0)[-1]
+    if first == volume:
+        return found
+    try:
+        return march(potential, found, VolumeControl, first, volume, magnetic=0.0)[-1]
+    except SolveError as error:
+        landed = caught(potential, VolumeControl(volume), ((error.result or [found])[-1],), magnetic=0.0)
+        if landed is None:
+            raise
+        return landed
+
+
+def _off_bodies(potential: ContactPotential, state: State) -> State | None:
+    """The largest volume, by tenths, to which a tension field can be let down from a state so that it touches no body; None where it is
+    slack before. From rest it could not be found: at small volumes a tension field is slack.
+    """
+    rest, bare = potential.space.reference_volume, potential.without_bodies
+    tenth = (state.volume - rest) / 10
+    for _ in range(9):
+        if is_slack(bare, state):
+            return None
+        if potential.touching(state.x) > 0:
+            break
+        try:
+            state = march(bare, state, VolumeControl, state.volume, state.volume - tenth, magnetic=0.0)[-1]
+        except SolveError:
+            return None
+    return state
 
 
 def _drawn_to(potential: Potential, drawn: State, volume: float) -> State | None:

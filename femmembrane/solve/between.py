@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from .continuation import StepControl, Tracer, trace_points
 from .controls import CONTROLS
 from .start import start_at_volume
 from .state import Predictor, State, hermite, joined, rests_flat
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactPotential
 
 #: what a node knows of its place, in this order
 QUANTITIES = ("volume", "pressure", "center_height")
@@ -47,11 +51,19 @@ class Direction:
         return self if sign >= 0 else Direction(-self.tangent, -self.rates)
 
 
-def direction_at(potential: Potential, x: Array, pressure: float) -> Direction | None:
-    """The direction of the branch at an equilibrium; None where it has none, as at a branch point."""
+def direction_at(potential: Potential, x: Array, pressure: float, evaluation: Evaluation | None = None) -> Direction | None:
+    """The direction of the branch at an equilibrium, on the mesh of the scene; None where it has none, as at a branch point.
+
+    Parameters
+    ----------
+    potential, x, pressure : Potential, ndarray, float
+        The equilibrium.
+    evaluation : Evaluation, optional
+        That of the equilibrium, with the nodes held that bodies hold along the branch. Left out: those that they hold there.
+    """
     if not x.any() and potential.flat:
         return _from_rest(potential) if rests_flat(potential) else None
-    evaluation = potential.evaluate(x, pressure)
+    evaluation = potential.evaluate(x, pressure) if evaluation is None else evaluation
     border = evaluation.volume_gradient
     size = float(np.linalg.norm(border))
     if not (evaluation.finite and size > 0):
@@ -70,7 +82,18 @@ def direction_at(potential: Potential, x: Array, pressure: float) -> Direction |
                 break
             dual = problem.dual(tangent)
             row, end = dual[:-1], float(dual[-1])
-    return Direction(tangent, rates_along(potential, pressure, evaluation, tangent))
+    rates = rates_along(potential, pressure, evaluation, tangent)
+    if not potential.obstacles:
+        return Direction(tangent, rates)
+    carried = joined(evaluation.carried(tangent[:-1]), float(tangent[-1]))
+    length = BranchProblem(potential.root).norm(carried)
+    return Direction(carried / length, rates / length)
+
+
+def directions_beside(potential: ContactPotential, x: Array, pressure: float) -> tuple[Direction | None, Direction | None]:
+    """The directions of the branch where a body is touched without a force: of the side that does not touch it, and of that which does."""
+    free, held = potential.beside(x, pressure)
+    return direction_at(potential, x, pressure, free), direction_at(potential, x, pressure, held)
 
 
 def _from_rest(potential: Potential) -> Direction | None:
@@ -92,11 +115,31 @@ def rates_along(potential: Potential, pressure: float, evaluation: Evaluation, t
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Node:
-    """A point of a branch that a cubic goes through: its unknowns (x, P), its places, and its direction where that is known."""
+    """A point of a branch that a cubic goes through.
+
+    Attributes
+    ----------
+    z : ndarray
+        Its unknowns (x, P) on the mesh of the scene.
+    places : ndarray
+    direction : Direction or None
+        Where that is known; at a corner that of the branch up to it.
+    beyond : Direction or None
+        At a corner: the direction of the branch beyond it.
+    corner : bool
+        Whether the branch has a corner here, as where contact begins or ends.
+    """
 
     z: Array
     places: Array
     direction: Direction | None
+    beyond: Direction | None = None
+    corner: bool = False
+
+    @property
+    def onward(self) -> Direction | None:
+        """The direction of the branch that leaves here."""
+        return self.beyond if self.corner else self.direction
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -150,8 +193,8 @@ def arc_between(problem: BranchProblem, a: Node, b: Node) -> Arc:
     chord, rise = b.z - a.z, b.places - a.places
     dual = problem.dual(chord)
     distance = max(math.sqrt(max(float(dual @ chord), 0.0)), 1e-300)
-    ends = [None if n.direction is None else n.direction.toward(float(dual @ n.direction.tangent)) for n in (a, b)]
-    first, last = ends
+    ends = (a.onward, b.direction)
+    first, last = (None if end is None else end.toward(float(dual @ end.tangent)) for end in ends)
     if first is not None and last is not None:
         half = math.acos(min(max(float(problem.dual(first.tangent) @ last.tangent), -1.0), 1.0)) / 2
         length = distance * (half / math.sin(half) if half else 1.0)  # of the circle through both points with these tangents
@@ -176,7 +219,8 @@ def rounded(arcs: Sequence[Arc]) -> list[Arc]:
     arcs = list(arcs)
     for k in range(len(arcs) - 1):
         before, after = arcs[k], arcs[k + 1]
-        if before.b is not after.a or before.b.direction is not None or not min(before.length, after.length) > 0:
+        apart = before.b is not after.a or before.b.direction is not None or before.b.corner
+        if apart or not min(before.length, after.length) > 0:
             continue
         share = before.length / (before.length + after.length)
         slope, rate = (
@@ -204,7 +248,7 @@ def across(problem: BranchProblem, arc: Arc, share: float) -> State | None:
 def followed(problem: BranchProblem, arc: Arc) -> list[State]:
     """Equilibria on the way from one end of an arc to the other, by arc length; none where the branch does not lead there."""
     potential, steps = problem.potential, _STRIDES
-    if arc.a.direction is None or arc.b.direction is None:
+    if arc.a.onward is None or arc.b.direction is None:
         return []
     x, pressure = arc.a.z[:-1], float(arc.a.z[-1])
     start = State(x, pressure, potential.evaluate(x, pressure), 0, 0.0, 0.0, 0.0)

@@ -1,16 +1,22 @@
-"""A membrane that comes to a source, in whose singular field no branch goes on."""
+"""A membrane that comes to a source, in whose singular field no branch goes on, or to an edge of a body too sharp for its elements."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..errors import SolveError, Status
-from ..potential import Array, Potential
+from ..physics.obstacles import Arc
+from ..potential import Array, Evaluation, Potential
+from ..scene.toml import item_path
 
 #: distance to a source, over the size of the membrane, at which it counts as touching it
 TOUCHING = 1e-3
 #: distance to a source, over the size of the membrane, below which a branch that cannot be followed has run into it
 NEARBY = 50 * TOUCHING
+#: length of an element over the radius of an edge from which on nodes jump around it
+_SHORT = 0.25
 
 
 def touches_source(distance: float, unit: float) -> str:
@@ -65,3 +71,45 @@ def stopped_by_source(error: SolveError, distance: float, unit: float) -> tuple[
     if distance >= NEARBY * unit:
         return None
     return Status.DIPOLE_CONTACT, f"{error}; the membrane is within {distance:.2g} of a source"
+
+
+def coarse_at_edge(evaluation: Evaluation, *, anywhere: bool = False) -> str:
+    """That elements are too long for a rounded edge of a body beside them, and what helps; empty where they are not.
+
+    On an edge of radius r a force F pushes a node off with F/r for each length, and the elements beside it, of length h, draw it back with
+    about F r/h^2. Where they are longer than the radius nodes jump from one side of the edge to the other.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    anywhere : bool
+        Whether the edges of all bodies count, and not only those that the membrane is at.
+    """
+    potential = evaluation.potential
+    scene, space = potential.scene, potential.space
+    ends = space.ends
+    (R, Z), (u, _, w, _) = space.mesh.position(ends), space.displacement(evaluation.x, ends)
+    rho, eta = R + u, Z + w
+    length = np.hypot(np.diff(rho), np.diff(eta))
+    found: list[tuple[float, float, int]] = []
+    for k, body in enumerate(potential.obstacles):
+        for piece in body.pieces():
+            if not (isinstance(piece, Arc) and piece.side > 0 and piece.radius > 0):
+                continue
+            away = np.hypot(rho - piece.center[0], eta - piece.center[1]) - piece.radius
+            near = np.minimum(away[:-1], away[1:]) < length
+            longest = float(length[near | anywhere].max(initial=0.0))
+            found.append((longest / piece.radius, piece.radius, k))
+    ratio, radius, k = max(found, default=(0.0, 1.0, 0))
+    if not ratio > _SHORT:
+        return ""
+    own = k < len(scene.obstacles)
+    name = item_path("obstacle", k, len(scene.obstacles)) if own else "source.body"
+    number = next((n for n in ("rounding", "radius") if own and getattr(scene.obstacles[k], n, None) == radius), "")
+    what = f"{name}.{number} = {radius:.3g}" if number else f"{name}: a radius of {radius:.3g}"
+    needed = math.ceil(ratio / _SHORT * space.n_elements)
+    return (
+        f"nodes jump around the edge of the {potential.obstacles[k].label()} ({what}), beside which elements are up to "
+        f"{ratio * radius:.3g} long; elements shorter than a quarter of the radius are needed there: {needed} even ones, or fewer that are "
+        f"graded (mesh.ratio, mesh.radii){', or a larger radius' if own else ''}"
+    )

@@ -13,13 +13,17 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar, cast
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
+from .contact import coarse_at_edge
 from .controls import CONTROLS, Controlled
 from .newton import TOLERANCE
 from .state import Predictor, State
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactEvaluation, ContactPotential
 
 #: steps so many times the smallest that turn on the spot have met a corner
 CORNER = 100.0
@@ -29,6 +33,9 @@ ROUND_OFF = 1e-14
 _BOTH_ENDS = 10.0
 #: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
 _MOVING = 0.02
+#: how far a point may be from its prediction, relative to its size, where other nodes are held by bodies, or other ends of elements stand
+#: at the borders of contact: the errors of the mesh change at once there, and no shorter step makes that less
+_REGROUPED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -80,12 +87,15 @@ class BranchPoint:
     dual: Array
     sigma: float
     own: Array | None = field(default=None, kw_only=True)
-    #: rates that were asked for, as two segments ask for those of the point between them
+    #: values and rates that were asked for, as two segments ask for those of the point between them
+    _values: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
     _rates: dict[Followed, float] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def value(self, quantity: Followed) -> float:
         """A quantity of the curve: volume, pressure or center_height by its name, or the amount of a gas."""
-        return self.state.value_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        if quantity not in self._values:
+            self._values[quantity] = self.state.value_of(CONTROLS[quantity] if isinstance(quantity, str) else quantity)
+        return self._values[quantity]
 
     def rate(self, quantity: Followed) -> float:
         """Derivative of a quantity with respect to arc length: zero at a fold in that quantity."""
@@ -97,7 +107,7 @@ class BranchPoint:
         """Derivative of a controlled number, such as the amount of a gas, with respect to arc length."""
         state, n = self.state, len(self.state.x)
         space, tangent = state.evaluation.potential.space, self.tangent if self.own is None else self.own
-        return controlled.rate(space, state.pressure, state.evaluation, tangent[:n], float(tangent[n]))
+        return controlled.rate(space, state.pressure, state.evaluation.raw, tangent[:n], float(tangent[n]))
 
 
 Point = TypeVar("Point", bound=BranchPoint)
@@ -231,6 +241,8 @@ def trace_points(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> 
             tracer.step /= 2
             if tracer.step < max(control.smallest, ROUND_OFF * abs(point.sigma)):  # no shorter one could be told from none
                 message = f"no step longer than {control.smallest:g} converges from {problem.place(point)}"
+                if reason := coarse_at_edge(point.state.evaluation):
+                    raise SolveError(f"{message}: {reason}", status=Status.NOT_RESOLVED)
                 raise SolveError(message, status=Status.STEP_UNDERFLOW)
         new.state.iterations = spent
         tracer.known = new.state.correction
@@ -253,7 +265,8 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     if known > TOLERANCE:  # along a soft direction both ends of the step are known so well only: that says nothing about it
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
     if new.own is not None:
-        miss = max(miss - _MOVING, 0.0)
+        jump = 0.0 if _held_by(point) == _held_by(new) else _REGROUPED * problem.norm(new.z) / length
+        miss = max(miss - _MOVING - jump, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)
@@ -264,3 +277,10 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
     half = angle / 2
     new.sigma = point.sigma + chord * (half / math.sin(half) if half else 1.0)  # of the circle through both points with these tangents
     return new, iterations, min((control.deviation / max(miss, 1e-12)) ** 0.25, control.turn / max(angle, 1e-12))
+
+
+def _held_by(point: BranchPoint) -> tuple[bytes, tuple[int, ...]]:
+    """The nodes that bodies hold, and the ends of elements that stand at borders of contact."""
+    evaluation = cast("ContactEvaluation", point.state.evaluation)
+    potential = cast("ContactPotential", evaluation.potential)
+    return evaluation.held.tobytes(), tuple(end for end, _ in potential.borders)

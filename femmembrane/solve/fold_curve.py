@@ -12,12 +12,19 @@ The border c is the mass times a mode close to the null vector, renewed at every
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, cast
+
 import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Family
+from .active_set import free_sides
 from .banded import BandFactor, BorderedFactor, WideBorder
 from .number_curve import Borders, Equations, NumberPoint, NumberProblem
+
+if TYPE_CHECKING:
+    from ..potential import ContactFamily
+    from ..potential.contact import ContactEvaluation
 
 #: kinds of folds that can be followed
 KINDS = ("limit_point", "volume_fold")
@@ -30,8 +37,8 @@ class FoldProblem(NumberProblem):
         super().__init__(family, scale, bounds)
         self.kind = kind
 
-    def at(self, z: Array, borders: Borders) -> Equations:
-        return (_LimitPoint if self.kind == "limit_point" else _VolumeFold)(self, z, borders)
+    def at(self, z: Array, borders: Borders, family: Family | None = None) -> Equations:
+        return (_LimitPoint if self.kind == "limit_point" else _VolumeFold)(self, z, borders, family)
 
     def first_borders(self, z: Array, sweeps: int = 6) -> Borders:
         """Modes of K and of the singular matrix closest to zero, by inverse iteration from the shape of the volume gradient."""
@@ -54,9 +61,33 @@ class _Fold(Equations):
 
     def linearise(self) -> None:
         self.find_mode()
-        t = self.problem.family.fold_derivatives(self.x, self.pressure, self.number, self.mode, self.q)
+        t, self.shift = self.family.fold_rates(self.evaluation, self.pressure, self.mode, self.q)
         self.force_number = t.force_number
         self.gap_row = -np.concatenate([t.cubic, [t.cubic_pressure, t.cubic_number]])
+
+    def let_go(self) -> None:
+        if self.evaluation.potential.borders:
+            self.gap_row = self.gap_row - self._by_borders()
+
+    def _by_borders(self) -> Array:
+        """Derivatives of the form by the borders of contact, which move with the state.
+
+        Where contact ends the normal part v_n of the mode sets in with a slope, and the form gains T v_n'^2 for each unit of length that
+        contact does (Hadamard); T is the force across the circle over the deformed length.
+        """
+        evaluation, family = cast("ContactEvaluation", self.evaluation), cast("ContactFamily", self.family)
+        gaps, (iu, iw), n = evaluation.gaps, family.place, family.space.n_free
+        mode = np.append(self.mode, 0.0)
+        across = mode[iu] * gaps.n_rho + mode[iw] * gaps.n_eta
+        row, number, drift = np.zeros(n + 1), 0.0, np.where(evaluation.held, 0.0, family.drift(evaluation)[0])
+        for side in free_sides(evaluation, self.pressure):
+            lost = side.tension * float(side.slope @ across[side.nodes]) ** 2
+            weights = -lost * side.slope / side.bend
+            np.add.at(row, iu[side.nodes], weights * gaps.n_rho[side.nodes])
+            np.add.at(row, iw[side.nodes], weights * gaps.n_eta[side.nodes])
+            number += lost * side.motion(drift)
+        row[:-1] = evaluation.reduction.projected(row[:-1])
+        return np.append(row[:-1], [0.0, number])
 
     def find_mode(self) -> None:
         raise NotImplementedError
@@ -70,13 +101,13 @@ class _LimitPoint(_Fold):
 class _VolumeFold(_Fold):
     def find_mode(self) -> None:
         borders = self.borders
-        edges = [-self.evaluation.volume_gradient, borders.mode]
+        edges = [-self.evaluation.volume_gradient, self.evaluation.row(borders.mode)]
         corner = np.array([[0.0, borders.mode_pressure], [borders.mode_pressure, 0.0]])
         self.mode, rest = WideBorder(self.deflated, edges, edges, corner).solve(None, [0.0, 1.0])
         self.q, self.gap = (float(r) for r in rest)
 
     def renewed(self) -> Borders:
-        return Borders(super().renewed().deflation, *self.problem.unit_mode(self.mode, self.q))
+        return Borders(super().renewed().deflation, *self.problem.unit_mode(self.evaluation.carried(self.mode), self.q))
 
 
 def first_fold(problem: FoldProblem, x: Array, pressure: float, number: float, direction: int) -> NumberPoint:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from .start import cold_start, start_at_volume
 from .state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from .state_resolution import refuse_unresolved
 from .stepping import Corrector, march
+from .ways import DOWNHILL, caught
 from .wellposed import ill_posed, slackness, unresolved_source
 
 #: who solves, by the public name
@@ -270,6 +271,11 @@ class LoadPath:
     def _landed(self, error: SolveError, load: float, jump: bool) -> tuple[State, Turn | None]:
         """At the next stable state at a load that steps in the load did not reach, where it may be gone to."""
         limit = self._beyond(error, load)
+        snapped = None
+        left = limit.fold.point.state if limit.fold else self.state
+        if jump and limit.landing is None and left is not None and self.potential.obstacles and self.held in DOWNHILL:
+            snapped = caught(self.potential, self.held.at(load), (left,))
+            limit = replace(limit, landing=snapped)
         turn = Turn(limit)
         if limit.fold is None and limit.ill_posed is not None and limit.landing is None:
             raise slackness(self.potential, limit.ill_posed) from error
@@ -277,7 +283,7 @@ class LoadPath:
         if limit.landing is None or not (jump or limit.fold is None):
             raise SolveError(str(turn), status=turn.status or error.status) from error
         self.memory = Predictor()
-        return self._arrived(limit.landing, load, None if limit.fold is None else turn)
+        return self._arrived(limit.landing, load, turn if limit.fold or snapped else None)
 
     def _beyond(self, error: SolveError, load: float) -> Limit:
         # next to a crossing of branches round-off lies along the other one; the last state that it did not touch has a tangent of its own

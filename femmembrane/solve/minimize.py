@@ -92,6 +92,9 @@ def minimize(
     status : str
         IPOPT's own return status, kept for the record.
     """
+    alone, factor = potential.by_itself(magnetic)
+    if alone is not potential:
+        potential, magnetic, evaluation = alone, factor, None
     evaluation = evaluation or potential.evaluate(x, pressure, magnetic)
     scale_u, scale_w = (float(np.abs(x[index]).max(initial=0.0)) or 1.0 for index in potential.space.fields)
     if potential.strained:  # stiff in both directions, so that one length measures both
@@ -191,12 +194,15 @@ def _solver_with_bodies(
     y, p = problem["x"], problem["p"]
     gaps = gap_rows(potential, y, p)
     count = gaps.numel()
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", count + int(constrained))
+    held = [(functions.volume(y, p), functions.volume_gradient(y, p)[1])] if constrained else []
+    if functions.charge is not None:
+        held.append(functions.charge(y, p))
+    values, rows = [value for value, _ in held], [row for _, row in held]
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", count + len(held))
     first = lam_g[0] if constrained else 0.0
-    second, _ = ca.hessian(ca.dot(lam_g[int(constrained) :], gaps), y)
+    second, _ = ca.hessian(ca.dot(lam_g[len(held) :], gaps), y)
     hessian = functions.hessian(y, p, lam_f, first) + ca.triu(second)
-    problem["g"] = ca.vertcat(functions.volume(y, p), gaps) if constrained else gaps
-    rows = [functions.volume_gradient(y, p)[1]] if constrained else []
+    problem["g"] = ca.vertcat(*values, gaps)
     options["ipopt"] = options["ipopt"] | {"bound_relax_factor": 0.0, "tol": 1e-11, "compl_inf_tol": 1e-11}
     options["jac_g"] = ca.Function("nlp_jac_g", [y, p], [problem["g"], ca.vertcat(*rows, ca.jacobian(gaps, y))])
     options["hess_lag"] = ca.Function("nlp_hess_l", [y, p, lam_f, lam_g], [hessian])

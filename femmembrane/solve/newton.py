@@ -100,65 +100,70 @@ def _corrected(
     max_iterations: int,
 ) -> NewtonResult:
     """:func:`correct` on a potential that is smooth: that of a membrane without bodies, or on a set of nodes that bodies hold."""
-    x = potential.placed(np.ascontiguousarray(x, dtype=float))
-    evaluation = potential.evaluate(x, pressure, magnetic)
-    previous, iteration, unbalance = np.inf, 0, np.inf
-    while True:
-        equations = Equations(potential, control, x, pressure, evaluation)
-        if not equations.finite:
-            return NewtonResult(x, pressure, evaluation, None, iteration, np.inf, np.inf, equations.gap, Status.NOT_CONVERGED)
-        dx, dp = equations.newton_step()
-        size = equations.size()
-        close, previously_close = size <= tolerance, previous <= tolerance
-        done = close and (equations.on_control or previously_close)  # good enough, but the load that was asked for is to be met exactly
-        done = (done and equations.balanced(dp)) or (0.5 * previous < size <= SOFT and equations.at_round_off)
-        stalled = not size < np.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
+    equations = Equations(potential, control, np.ascontiguousarray(x, dtype=float), pressure, magnetic)
+    previous, iteration, unbalance = math.inf, 0, math.inf
+    while equations.finite:
+        dx, dp, size = equations.newton_step()
+        # good enough, but the load that was asked for is to be met exactly
+        done = size <= tolerance and (previous <= tolerance or equations.on_control) and equations.balanced(dp)
+        done = done or (0.5 * previous < size <= SOFT and equations.at_round_off)
+        stalled = not size < math.inf or (not damped and size > 0.5 * previous and size > 1e3 * tolerance)
         if stalled and size <= 100 * SOFT and not done:
             before, unbalance = unbalance, equations.residual
             # along a soft direction corrections are round-off, while the forces are balanced or still come into balance
             stalled = unbalance > max(1e-2 * before, NEARLY_BALANCED * potential.space.slenderness)
         if done or stalled or iteration == max_iterations:
             return equations.result(iteration, size, Status.CONVERGED if done else Status.NOT_CONVERGED)
-        length = _damping(equations, dx, dp, size, magnetic) if damped else 1.0
-        x, pressure = (x + dx, pressure + dp) if length == 1 else (x + length * dx, pressure + length * dp)
-        x = potential.placed(x)
-        evaluation = potential.evaluate(x, pressure, magnetic)
+        length = _damping(equations, dx, dp, size) if damped else 1.0
+        if length != 1:
+            dx, dp = length * dx, length * dp
+        equations.stand_at(equations.x + dx, equations.pressure + dp)
         iteration += 1
         # quadratic convergence, c_next = (c/c_previous)^2 c, spares the last factorisation; the residual at x has the last word, together
         # with its correction by the factors at hand: next to a limit point a state with a small residual may be far from the solution
-        foretold = size * (min(size, 1.0) if previous in (0.0, np.inf) else (size / previous) ** 2) if length == 1 else np.inf
-        if foretold <= tolerance / 10:
-            last = Equations(potential, control, x, pressure, evaluation, equations.bordered)
-            if last.finite and (left := last.correction()) <= tolerance / 10:
-                result = last.result(iteration, left, Status.CONVERGED)
-                if result.residual <= RESIDUAL:
-                    return result
+        foretold = size * ((size / previous) ** 2 if 0 < previous < math.inf else min(size, 1.0))
+        if foretold <= tolerance / 10 and length == 1 and equations.finite and (left := equations.simplified_size()) <= tolerance / 10:
+            result = equations.result(iteration, left, Status.CONVERGED)
+            if result.residual <= RESIDUAL:
+                return result
         previous = size
+    gap = equations.gap
+    return NewtonResult(
+        equations.x, equations.pressure, equations.evaluation, None, iteration, math.inf, math.inf, gap, Status.NOT_CONVERGED
+    )
 
 
 class Equations:
-    """Residuals and bordered factors at one state."""
+    """Residuals at the state where a corrector stands, and bordered factors there or at the state before.
+
+    Attributes
+    ----------
+    gap : float
+        Error of the equation of the control.
+    finite : bool
+        Whether there are numbers to go on with.
+    """
 
     __slots__ = (
-        *("potential", "control", "x", "pressure", "evaluation", "bordered"),
-        *("gap", "finite", "_row", "_corner", "_round_off", "_scales", "_change", "_size"),
+        *("potential", "control", "x", "pressure", "magnetic", "evaluation", "bordered", "gap", "finite"),
+        *("_row", "_corner", "_round_off", "_least"),
     )
 
-    def __init__(
-        self,
-        potential: Potential,
-        control: Control,
-        x: Array,
-        pressure: float,
-        evaluation: Evaluation,
-        bordered: Border | None = None,
-    ) -> None:
-        self.potential, self.control, self.x, self.pressure, self.evaluation = potential, control, x, pressure, evaluation
-        self.gap, self._row, self._corner = control.equation(potential.space, x, pressure, evaluation)
+    def __init__(self, potential: Potential, control: Control, x: Array, pressure: float, magnetic: float = 1.0) -> None:
+        self.potential, self.control, self.magnetic = potential, control, magnetic
         self._round_off: float = potential.space.volume_round_off if isinstance(control, VolumeControl) else 0.0
+        self._least = least_displaced(potential)
+        self.bordered: Border | None = None
+        self.stand_at(x, pressure)
+
+    def stand_at(self, x: Array, pressure: float) -> None:
+        """Go to another state; the factors stay those of the state before."""
+        potential = self.potential
+        self.x = x = potential.placed(x, self.magnetic)
+        self.pressure = pressure
+        self.evaluation = evaluation = potential.evaluate(x, pressure, self.magnetic)
+        self.gap, self._row, self._corner = self.control.equation(potential.space, x, pressure, evaluation)
         self.finite = evaluation.finite and abs(pressure) < _ABSURD
-        self.bordered = bordered
-        self._scales: tuple[float, float] | None = None
 
     @property
     def on_control(self) -> bool:
@@ -176,9 +181,7 @@ class Equations:
     @property
     def scales(self) -> tuple[float, float]:
         """The forces that meet at a node, largest along u and along w."""
-        if self._scales is None:
-            self._scales = self.evaluation.force_scale(self.pressure)
-        return self._scales
+        return self.evaluation.force_scale(self.pressure)
 
     @property
     def residual(self) -> float:
@@ -193,50 +196,48 @@ class Equations:
         """Whether a correction of P changes no force."""
         return abs(dp) * max(self.evaluation.elements.largest(self.evaluation.volume_gradient)) <= PRESSURE * max(self.scales)
 
-    def newton_step(self) -> tuple[Array, float]:
-        """:func:`relative_size` of a correction, without a component that is zero and in balance to round-off."""
-        gap = self.gap if abs(self.gap) > self._round_off else 0.0  # next to rest it would move the membrane by more than it is displaced
-        if self.bordered is None:
-            self.bordered, dx, dp, self._change, size = self.evaluation.step(self._row, self._corner, gap)
-            self._size = with_lift(self.potential, size)
-            return dx, dp
-        largest = self.evaluation.elements.largest
-        dx, dp = self.bordered.solve(self.evaluation.unbalanced, -gap)
-        self._change, self._size = largest(dx), with_lift(self.potential, largest(self.x))
-        return dx, dp
+    def newton_step(self) -> tuple[Array, float, float]:
+        """The correction of x and P by factors at this state, and its :meth:`size`."""
+        # next to rest a gap of round-off would move the membrane by more than it is displaced
+        gap = self.gap if abs(self.gap) > self._round_off else 0.0
+        self.bordered, dx, dp, change, size = self.evaluation.step(self._row, self._corner, gap)
+        return dx, dp, self.size(change, size)
 
-    def size(self) -> float:
-        """:func:`relative_size` of the correction, less that of a component which is zero but for round-off and in balance to round-off."""
-        change, size = self._change, self._size
+    def simplified_size(self) -> float:
+        """The :meth:`size` of the correction by the factors of the state before."""
+        gap = self.gap if abs(self.gap) > self._round_off else 0.0
+        largest, dx = self.evaluation.elements.largest, self.simplified_step(self.evaluation.unbalanced, gap)
+        return self.size(largest(dx), largest(self.x))
+
+    def size(self, change: tuple[float, float], size: tuple[float, float]) -> float:
+        """A correction relative to the displacement, less a component of it that is zero but for round-off and in balance to round-off.
+
+        Parameters
+        ----------
+        change, size : tuple of float
+            Largest entries of both, along u and along w.
+        """
+        if self._least is not None:
+            size = max(size[0], self._least[0]), max(size[1], self._least[1])
         worst = _relative(change, size)
-        small = NEGLIGIBLE * max(*size, *change)
-        if TOLERANCE < worst < math.inf and (max(change[0], size[0]) <= small or max(change[1], size[1]) <= small):
+        if TOLERANCE < worst < math.inf and min(size) <= (small := NEGLIGIBLE * max(*size, *change)):
             negligible = [0 < c <= small and s <= small for c, s in zip(change, size, strict=True)]
             if any(negligible):
                 kept = [0.0 if n and r <= RESIDUAL else c for n, r, c in zip(negligible, self.residuals(), change, strict=True)]
                 return _relative((kept[0], kept[1]), size)
         return worst
 
-    def correction(self) -> float:
-        """:meth:`size` of the correction there."""
-        self.newton_step()
-        return self.size()
-
     def result(self, iterations: int, correction: float, status: Status) -> NewtonResult:
         return NewtonResult(self.x, self.pressure, self.evaluation, self.bordered, iterations, correction, self.residual, self.gap, status)
 
-    @property
-    def _factored(self) -> Border:
+    def simplified_step(self, unbalanced: Array, gap: float) -> Array:
+        """The correction that the factors at hand give for residuals elsewhere."""
         if self.bordered is None:
             raise ArithmeticError("no factors where the energy is undefined")
-        return self.bordered
-
-    def simplified_step(self, unbalanced: Array, gap: float) -> Array:
-        """The correction that the factors here give for residuals elsewhere."""
-        return self._factored.solve(unbalanced, -gap)[0]
+        return self.bordered.solve(unbalanced, -gap)[0]
 
 
-def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: float) -> float:
+def _damping(equations: Equations, dx: Array, dp: float, size: float) -> float:
     """Largest step length 1, 1/2, 1/4, ... after which the simplified correction has shrunk."""
     potential, length = equations.potential, 1.0
     # both corrections in the units of the first, which may be larger than the displacement itself
@@ -244,8 +245,8 @@ def _damping(equations: Equations, dx: Array, dp: float, size: float, magnetic: 
     # a component that is zero but for round-off, as along a tube that widens alone, has no size of its own
     units = [unit if unit > NEGLIGIBLE * max(units) else max(units) for unit in units]
     while length > 1e-4:
-        x, pressure = potential.placed(equations.x + length * dx), equations.pressure + length * dp
-        new = potential.evaluate(x, pressure, magnetic)
+        x, pressure = potential.placed(equations.x + length * dx, equations.magnetic), equations.pressure + length * dp
+        new = potential.evaluate(x, pressure, equations.magnetic)
         unbalanced = new.unbalanced
         if max(potential.largest(unbalanced)) < np.inf:
             gap = equations.control.equation(potential.space, x, pressure, new)[0]
@@ -263,30 +264,29 @@ def relative_size(potential: Potential, dx: Array, x: Array) -> float:
 
 def displaced(potential: Potential, x: Array) -> tuple[float, float]:
     """Largest displacements u and w of a state, or those that the places of the ends make of themselves where these are larger."""
-    return with_lift(potential, potential.largest(x))
+    (u, w), least = potential.largest(x), least_displaced(potential)
+    return (u, w) if least is None else (max(u, least[0]), max(w, least[1]))
 
 
-def with_lift(potential: Potential, size: tuple[float, float]) -> tuple[float, float]:
-    """Largest unknowns u and w, or the displacements that the places of the ends make where these are larger.
+def least_displaced(potential: Potential) -> tuple[float, float] | None:
+    """The displacements u and w that the places of the ends make; None where they make none.
 
     Forces of a material with stress at rest are round-off of the membrane's own size.
     """
-    if not potential.strained and potential.space.lift is None:
-        return size
-    space, (u, w) = potential.space, size
-    u0, w0 = (0.0, 0.0) if space.lift is None else space.lift_size
+    space = potential.space
+    if not potential.strained and space.lift is None:
+        return None
+    u, w = (0.0, 0.0) if space.lift is None else space.lift_size
     if potential.prestressed:
-        u0, w0 = max(u0, space.unit), w0 if potential.level else max(w0, space.unit)
-    return max(u, u0), max(w, w0)
+        u, w = max(u, space.unit), w if potential.level else max(w, space.unit)
+    return u, w
 
 
 def _relative(change: tuple[float, float], size: tuple[float, float]) -> float:
     """The larger of two changes relative to the sizes, or to themselves where they are larger; infinite where one is no number."""
     (du, dw), (u, w) = change, size
-    if du == math.inf or dw == math.inf:
-        return math.inf
-    a = (du / u if du < u else 1.0) if du else 0.0
-    b = (dw / w if dw < w else 1.0) if dw else 0.0
+    a = du / u if du < u else (1.0 if 0 < du < math.inf else du)
+    b = dw / w if dw < w else (1.0 if 0 < dw < math.inf else dw)
     return a if a > b else b
 
 

@@ -19,18 +19,21 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ..errors import SolveError, Status
-from ..potential import Array, Family
+from ..errors import InputError, SolveError, Status
+from ..potential import Array, ContactFamily, Evaluation, Family, Potential
+from ..potential.contact_family import HeldFamily
+from .active_set import settled
 from .banded import BandFactor, BorderedFactor, WideBorder, band_product
 from .bare import moderate
 from .branch import AT_CROSSING, FOLDS, BranchProblem
 from .continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, GasOver, PressureControl, at_number
-from .newton import TOLERANCE, relative_residual, relative_size
+from .newton import TOLERANCE, NewtonResult, relative_residual, relative_size
 from .search import FAR, Limit
 from .segment import Located, Segment
 from .special_points import branch_point
@@ -80,7 +83,7 @@ class NumberPoint(BranchPoint):
         rate, family = BranchPoint.rate(self, here), evaluation.potential
         if not isinstance(family, Family):
             return rate
-        return rate + control_rate(family, control, self.state.x, self.state.pressure, evaluation) * float(self.tangent[-1])
+        return rate + control_rate(family, control, evaluation.x, self.state.pressure, evaluation) * float(self.tangent[-1])
 
     def _here(self, quantity: Followed) -> Followed:
         """A quantity at the number of this point: the gas may be in a chamber that changes."""
@@ -90,39 +93,71 @@ class NumberPoint(BranchPoint):
 class Equations:
     """R and g at one (x, P, m), with what one Newton step needs.
 
-    :meth:`linearise` of a subclass sets ``gap``, the value of g, ``gap_row``, its derivatives, and ``force_number``, that of R with respect
-    to the number.
+    :meth:`linearise` of a subclass sets ``gap``, the value of g, ``gap_row``, its derivatives, ``force_number``, that of R with respect to
+    the number, and ``shift``, the displacement with the number of nodes that bodies hold. Beside bodies x, R and K are those on the mesh
+    that follows borders of contact, of displacements that the bodies leave; rows and modes are on the mesh of the scene.
+
+    Parameters
+    ----------
+    problem : NumberProblem
+    z : ndarray
+        (x, P, m).
+    borders : Borders
+    family : Family, optional
+        That on a set of held nodes; left out: that of the problem.
     """
 
     gap: float
     gap_row: Array
     force_number: Array
+    shift: Array | None = None
 
-    def __init__(self, problem: NumberProblem, z: Array, borders: Borders) -> None:
-        self.problem, self.z, self.borders = problem, z, borders
+    def __init__(self, problem: NumberProblem, z: Array, borders: Borders, family: Family | None = None) -> None:
+        self.problem, self.z, self.borders, self.family = problem, z, borders, family or problem.family
         self.x, self.pressure, self.number = z[:-2], float(z[-2]), float(z[-1])
-        self.evaluation = problem.family.evaluate(self.x, self.pressure, self.number)
+        self.evaluation = self.family.evaluate(self.x, self.pressure, self.number)
         self.force = self.evaluation.gradient - self.pressure * self.evaluation.volume_gradient
         self.finite = bool(np.isfinite(self.force).all() and np.isfinite(self.evaluation.stiffness_density).all())
 
     def factorise(self) -> None:
         """Factors of [K, b; b^T, 0], the null vector that they give, and g with all derivatives."""
         self.factor = BandFactor.of(self.evaluation)
-        self.deflated = BorderedFactor(self.factor, self.borders.deflation, self.borders.deflation, 0.0)
+        deflation = self.evaluation.row(self.borders.deflation)
+        self.deflated = BorderedFactor(self.factor, deflation, deflation, 0.0)
         self.null, self.null_gap = self.deflated.solve(np.zeros_like(self.force), 1.0)
         self.linearise()
 
     def linearise(self) -> None:
         raise NotImplementedError
 
+    def let_go(self) -> None:
+        """Let the borders of contact move with the state from here on: corrections leave them in their places, and rates do not."""
+
     def jacobian(self, row: Array) -> WideBorder:
-        """Of (R, g, row . z) with respect to (x, P, m)."""
-        corner = np.stack([self.gap_row[-2:], row[-2:]])
-        return WideBorder(self.deflated, [-self.evaluation.volume_gradient, self.force_number], [self.gap_row[:-2], row[:-2]], corner)
+        """Of (R, g, row . z) with respect to (x, P, m), without what bodies do to x."""
+        rows = [self.gap_row, row]
+        if self.shift is not None:
+            rows = [np.append(r[:-1], r[-1] + r[:-2] @ self.shift) for r in rows]
+        corner = np.stack([r[-2:] for r in rows])
+        return WideBorder(self.deflated, [-self.evaluation.volume_gradient, self.force_number], [r[:-2] for r in rows], corner)
+
+    def whole(self, dx: Array, rest: Array) -> Array:
+        """A solution of :meth:`jacobian` with what bodies do to x."""
+        return np.concatenate([dx if self.shift is None else dx + rest[1] * self.shift, rest])
+
+    def carried(self, z: Array) -> Array:
+        """(x, P, m) with x on the mesh of the scene."""
+        x = self.evaluation.carried(z[:-2])
+        return z if x is z[:-2] else np.concatenate([x, z[-2:]])
+
+    def row(self, row: Array) -> Array:
+        """A row on the mesh of the scene as one of z."""
+        own = self.evaluation.row(row[:-2])
+        return np.concatenate([own, row[-2:]])
 
     def renewed(self) -> Borders:
         """Borders made from the null vectors here: one step of inverse iteration each."""
-        deflation = self.problem.unit_mode(self.null, 0.0)[0]
+        deflation = self.problem.unit_mode(self.evaluation.carried(self.null), 0.0)[0]
         return Borders(deflation, deflation, 0.0)
 
 
@@ -148,6 +183,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
 
     def __init__(self, family: Family, scale: float, bounds: tuple[float, float]) -> None:
         self.potential = self.family = family
+        self.cornered = family.unsettled
         self._branch = BranchProblem(family)
         self.scale, self.bounds = scale, bounds
 
@@ -213,10 +249,17 @@ class NumberProblem(CurveProblem[NumberPoint]):
 
     def determinant_sign(self, point: NumberPoint) -> int:
         """Of the derivatives of R, g and the arc length: det [K, b; b^T, 0] = -(b . K^-1 b) det K, and the dense part of the border."""
-        equations = self.at(point.z, point.borders)
+        equations = self._there(point.state.evaluation, point.z, point.borders)
         equations.factorise()
+        equations.let_go()
         deflated = equations.factor.determinant_sign() * (1 if equations.null_gap > 0 else -1)  # the gap is -1/(b . K^-1 b)
-        return deflated * equations.jacobian(point.dual).determinant_sign()
+        return deflated * equations.jacobian(equations.row(point.dual)).determinant_sign()
+
+    def _there(self, evaluation: Evaluation, z: Array, borders: Borders) -> Equations:
+        """The equations at a state, on the set of held nodes that it has."""
+        if not self.family.unsettled:
+            return self.at(z, borders)
+        return self.at(np.concatenate([evaluation.x, z[-2:]]), borders, cast("Family", evaluation.potential))
 
     def first(self, x: Array, pressure: float, number: float, direction: int) -> NumberPoint | None:
         """The point next to a guess at the same value of the number, oriented towards larger ones for direction +1."""
@@ -245,7 +288,11 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return Borders(deflation, deflation, 0.0)
 
     def _at_start(self, z: Array) -> Equations:
-        equations = Equations(self, z, Borders(np.zeros(0), np.zeros(0), 0.0))
+        family = self.family
+        if isinstance(family, ContactFamily):
+            held = family.holding(family.pressed(z[:-2], float(z[-2]), float(z[-1])))
+            family, z = held, np.concatenate([held.placed(z[:-2], float(z[-1])), z[-2:]])
+        equations = Equations(self, z, Borders(np.zeros(0), np.zeros(0), 0.0), family)
         if not equations.finite:
             raise SolveError("the start lies outside the domain of the energy", status=Status.NOT_CONVERGED)
         return equations
@@ -258,8 +305,8 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return z
 
     @abstractmethod
-    def at(self, z: Array, borders: Borders) -> Equations:
-        """The equations at one (x, P, m)."""
+    def at(self, z: Array, borders: Borders, family: Family | None = None) -> Equations:
+        """The equations at one (x, P, m), on a set of held nodes where a family on one is given."""
 
     def _newton(
         self, z: Array, borders: Borders, closing: _Closing, orientation: Array, tolerance: float = TOLERANCE
@@ -268,54 +315,106 @@ class NumberProblem(CurveProblem[NumberPoint]):
 
         The tangent is that of the curve, oriented so that the row ``orientation`` is positive on it.
         """
+        if not self.family.unsettled:
+            found = self._on_set(self.family, z, borders, closing, tolerance)
+        else:
+            found = self._in_contact(z, borders, closing, tolerance)
+        if found.last is None:
+            return None, found.iterations
+        return self._point(found, orientation), found.iterations
+
+    def _on_set(self, family: Family, z: Array, borders: Borders, closing: _Closing, tolerance: float, patient: bool = False) -> _Corrected:
+        """Newton's method on a family that is smooth; with patience corrections need not shrink from the first one on."""
         previous = np.inf
         for iteration in range(_MAX_ITERATIONS + 1):
-            equations = self.at(z, borders)
+            if isinstance(family, HeldFamily):
+                z = np.concatenate([family.placed(z[:-2], float(z[-1])), z[-2:]])
+            equations = self.at(z, borders, family)
             if not equations.finite:
-                return None, iteration
+                return _Corrected(iteration)
             equations.factorise()
             try:
                 gap, row = closing(equations)
                 jacobian = equations.jacobian(row)
-                dx, rest = jacobian.solve(-equations.force, [-equations.gap, -gap])
+                change = equations.whole(*jacobian.solve(-equations.force, [-equations.gap, -gap]))
             except np.linalg.LinAlgError:
-                return None, iteration
+                return _Corrected(iteration)
             size = max(
-                relative_size(self.family, dx, z[:-2]),
-                abs(rest[0]) / (self.family.space.units["pressure"] + abs(z[-2])),
-                abs(rest[1]) / max(self.scale, abs(z[-1])),
+                relative_size(self.family, change[:-2], z[:-2]),
+                abs(change[-2]) / (self.family.space.units["pressure"] + abs(z[-2])),
+                abs(change[-1]) / max(self.scale, abs(z[-1])),
             )
             if size <= tolerance:
-                return self._point(equations, jacobian, iteration, float(size), orientation), iteration
-            if not np.isfinite(size) or (size > 0.5 * previous and size > 1e3 * tolerance):
-                return None, iteration
+                return _Corrected(iteration, equations, row, float(size))
+            if not np.isfinite(size) or (size > (2.0 if patient else 0.5) * previous and size > 1e3 * tolerance):
+                return _Corrected(iteration)
             previous = size
-            z = self.settled(z + np.concatenate([dx, rest]))
-        return None, _MAX_ITERATIONS
+            z = self.settled(z + change)
+        return _Corrected(_MAX_ITERATIONS)
 
-    def _point(self, equations: Equations, jacobian: WideBorder, iterations: int, correction: float, orientation: Array) -> NumberPoint:
+    def _in_contact(self, z: Array, borders: Borders, closing: _Closing, tolerance: float) -> _Corrected:
+        """Newton's method on the sets of held nodes, and with the ends of elements, to which the active set leads."""
+        known: dict[int, _Corrected] = {}
+        number = float(z[-1])
+
+        def once(potential: Potential, *, control: Control, x: Array, pressure: float, damped: bool = False) -> NewtonResult:
+            nonlocal number
+            guess, on = np.concatenate([x, [pressure, number]]), cast("Family", potential)
+            found = self._on_set(on, guess, borders, closing, tolerance, patient=damped)
+            last = found.last
+            if last is None:
+                evaluation = potential.evaluate(x, pressure, number)
+                return NewtonResult(x, pressure, evaluation, None, found.iterations, np.inf, np.inf, np.inf, Status.NOT_CONVERGED)
+            number, known[id(last.evaluation)] = last.number, found
+            given = last.x, last.pressure, last.evaluation, None, found.iterations, found.correction
+            return NewtonResult(*given, 0.0, 0.0, Status.CONVERGED)
+
+        try:
+            result = settled(once, cast("Control", None), self.family, z[:-2], float(z[-2]), number)
+        except InputError:  # the corrector went to values that a body cannot have
+            return _Corrected(_MAX_ITERATIONS)
+        if result.status is not Status.CONVERGED:
+            return _Corrected(result.iterations)
+        return replace(known[id(result.evaluation)], iterations=result.iterations)
+
+    def _point(self, found: _Corrected, orientation: Array) -> NumberPoint:
+        equations, row = cast("Equations", found.last), cast("Array", found.row)
+        equations.let_go()
         evaluation, pressure = equations.evaluation, equations.pressure
-        residual = relative_residual(self.family, equations.force, evaluation, pressure)
-        state = State(equations.x, pressure, evaluation, iterations, correction, residual, gap=0.0, _factor=equations.factor)
-        dx, rest = jacobian.solve(None, [0.0, 1.0])
-        tangent = np.concatenate([dx, rest])
-        tangent /= self.norm(tangent)
+        residual = relative_residual(equations.family, equations.force, evaluation, pressure)
+        z = equations.carried(equations.z)
+        state = State(z[:-2], pressure, evaluation, found.iterations, found.correction, residual, gap=0.0, _factor=equations.factor)
+        own = equations.whole(*equations.jacobian(row).solve(None, [0.0, 1.0]))
+        tangent = equations.carried(own)
+        length = self.norm(tangent)
         if orientation @ tangent < 0:
-            tangent = -tangent
-        return NumberPoint(state, equations.z, tangent, self.dual(tangent), 0.0, equations.renewed())
+            length = -length
+        tangent, own = tangent / length, own / length
+        there = own if self.family.unsettled else None
+        return NumberPoint(state, z, tangent, self.dual(tangent), 0.0, equations.renewed(), own=there)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Corrected:
+    """Where Newton's method ended: the last equations with the row of the last one, None where it did not converge."""
+
+    iterations: int
+    last: Equations | None = None
+    row: Array | None = None
+    correction: float = math.inf
 
 
 def _hyperplane(row: Array, guess: Array) -> _Closing:
     """row . (z - guess) = 0."""
-    return lambda equations: (float(row @ (equations.z - guess)), row)
+    return lambda equations: (float(row @ (equations.carried(equations.z) - guess)), equations.row(row))
 
 
 def _controlled(equations: Equations, control: Control) -> tuple[float, Array]:
     """Value and derivatives of a control with respect to (x, P, m)."""
-    state = equations.x, equations.pressure, equations.evaluation
+    state = equations.x, equations.pressure, equations.evaluation.raw
     control = at_number(control, equations.number)
-    gap, row, corner = control.equation(equations.problem.family.space, *state)
-    rate = control_rate(equations.problem.family, control, equations.x, equations.pressure, equations.evaluation)
+    gap, row, corner = control.equation(equations.family.space, *state)
+    rate = control_rate(equations.family, control, equations.x, equations.pressure, equations.evaluation)
     return gap, np.concatenate([row, [corner, rate]])
 
 
@@ -337,8 +436,8 @@ class ControlledProblem(NumberProblem):
         # what is held turns nowhere
         self.folds = {TURN: NUMBER, **{kind: q for kind, q in FOLDS.items() if type(control) is not CONTROLS[q].at}}
 
-    def at(self, z: Array, borders: Borders) -> Equations:
-        return _Controlled(self, z, borders)
+    def at(self, z: Array, borders: Borders, family: Family | None = None) -> Equations:
+        return _Controlled(self, z, borders, family)
 
     def settled(self, z: Array) -> Array:
         if isinstance(self.control, PressureControl):
@@ -356,8 +455,7 @@ class ControlledProblem(NumberProblem):
     def forbids(self, before: NumberPoint, after: NumberPoint) -> bool:
         if not self.family.takes(after.number):  # the corrector went beyond the last value that a scene has
             return True
-        member = self.family.member
-        return member(after.number).came_through_source(after.state.x, member(before.number), before.state.x)
+        return self.family.came_through_source(after.number, after.state.x, before.number, before.state.x)
 
 
 class _Controlled(Equations):
@@ -365,7 +463,7 @@ class _Controlled(Equations):
 
     def linearise(self) -> None:
         self.gap, self.gap_row = _controlled(self, self.problem.control)
-        self.force_number = self.problem.family.number_derivative(self.x, self.pressure, self.number)
+        self.force_number, self.shift = self.family.number_rates(self.evaluation, self.pressure)
 
 
 def beyond_turn(
@@ -395,6 +493,7 @@ def beyond_turn(
         The stable state that the membrane goes to from a turn, at the number; None where none was met.
     """
     family, fold, last = problem.family, None, point.state
+    far = FAR * moderate(family.member(point.number) if family.unsettled else family)
     points = trace_points(problem, point, Tracer(Predictor(), StepControl().first))
     for _ in range(max_steps):
         try:
@@ -416,7 +515,7 @@ def beyond_turn(
             before = fold is None or met.sigma < fold.point.sigma
             if met is not (fold and fold.point) and ((before and any_before) or stable(met.state)):
                 return Limit(None if before else fold, met.state, last=met.state)
-        if new.number in problem.bounds or abs(new.state.volume) > FAR * moderate(family):
+        if new.number in problem.bounds or abs(new.state.volume) > far:
             break
         point = new
     return Limit(fold, None, last=last)

@@ -19,6 +19,7 @@ from .segment import Located
 from .state import Predictor, State
 from .state_resolution import refuse_unresolved
 from .stepping import march
+from .ways import DOWNHILL, caught
 from .wellposed import ill_posed, slackness, unresolved_source
 
 #: most steps along the branch of one scene on which a stable state is looked for
@@ -150,13 +151,18 @@ class NumberPath:
             return self._beside(fold.point, load, stable)
 
         limit = beyond_turn(problem, start, load, stable, any_before=not minima, beside=beside)
+        snapped = None
+        if jump and limit.landing is None and self.family.obstacles and self.held in DOWNHILL:
+            left = limit.fold.point.state if limit.fold else last
+            snapped = caught(self._member(load, built=True), self.held.at(self.value), (left,))
+            limit = limit if snapped is None else replace(limit, landing=self._here(snapped, load))
         turn = NumberTurn(limit, self.name)
         if limit.fold is None and limit.ill_posed is not None and limit.landing is None:
             raise slackness(self._member(limit.ill_posed.evaluation.factor), limit.ill_posed) from error
         if limit.landing is None or not (jump or limit.fold is None):
             raise SolveError(str(turn), status=turn.status or error.status) from error
         self.memory = Predictor()
-        return self._arrived(limit.landing, load, None if limit.fold is None else turn)
+        return self._arrived(limit.landing, load, turn if limit.fold or snapped else None)
 
     def _beside(self, fold: NumberPoint, load: float, stable: Callable[[State], bool]) -> State | None:
         """The first stable state on the branch of the scene with a value of the number, beyond the place where the branch over it turned.

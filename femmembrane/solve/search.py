@@ -188,10 +188,10 @@ class Search:
     def _deflated_newton(self, control: Control, x: Array, pressure: float, iterations: int = 40) -> State | None:
         potential = self.potential
         for _ in range(iterations):
-            equations = Equations(potential, control, x, pressure, potential.evaluate(x, pressure))
+            equations = Equations(potential, control, x, pressure)
             if not equations.finite:
                 return None
-            dx, dp = equations.newton_step()
+            dx, dp, _ = equations.newton_step()
             self.iterations += 1
             if relative_size(potential, dx, x) <= TOLERANCE**0.5:
                 result = correct(potential, control, x, pressure)

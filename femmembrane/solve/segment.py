@@ -79,24 +79,29 @@ class Segment(Generic[Point]):
 
     def _folds_in(self, quantity: Followed) -> list[tuple[float, Located[Point]]]:
         """The folds in a quantity with their shares of the segment, located once."""
-        if self.leaving or any(self.problem.stays(quantity, point) for point in (self.a, self.b)):
-            return []
         if quantity not in self._folds:
-            kind = next((k for k, q in self.problem.folds.items() if q == quantity), "")
-            r0, r1 = self.a.rate(quantity), self.b.rate(quantity)
-            shares, rates, guess = [0.0, 1.0], [r0, r1], None
-            if r0 * r1 > 0:
-                if (top := self._extremum(quantity, r0, r1)) is not None:
-                    shares, rates = [0.0, top, 1.0], [r0, self.at(top).rate(quantity), r1]
-            elif r0 * r1 < 0:
-                guess = self._turn(quantity, r0, r1)
-            found = [
-                self._root(kind, lambda point: point.rate(quantity), lo, hi, guess)
-                for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
-                if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0 and not self.problem.mirrored(self.a))
-            ]
-            self._folds[quantity] = [fold for fold in found if self._turns(quantity, fold[1])]
+            self._folds[quantity] = self._look_for_folds(quantity)
         return self._folds[quantity]
+
+    def _look_for_folds(self, quantity: Followed) -> list[tuple[float, Located[Point]]]:
+        a, b, stays = self.a, self.b, self.problem.stays
+        if self.leaving or stays(quantity, a) or stays(quantity, b):
+            return []
+        r0, r1 = a.rate(quantity), b.rate(quantity)
+        shares, rates, guess = [0.0, 1.0], [r0, r1], None
+        if r0 * r1 > 0:
+            if (top := self._extremum(quantity, r0, r1)) is None:
+                return []
+            shares, rates = [0.0, top, 1.0], [r0, self.at(top).rate(quantity), r1]
+        elif r0 * r1 < 0:
+            guess = self._turn(quantity, r0, r1)
+        kind = next((k for k, q in self.problem.folds.items() if q == quantity), "")
+        found = [
+            self._root(kind, lambda point: point.rate(quantity), lo, hi, guess)
+            for lo, hi, r0, r1 in zip(shares, shares[1:], rates, rates[1:], strict=False)
+            if r0 * r1 < 0 or (r0 == 0 and lo == 0.0 and r1 != 0 and not self.problem.mirrored(a))
+        ]
+        return [fold for fold in found if self._turns(quantity, fold[1])]
 
     def _turns(self, quantity: Followed, located: Located[Point]) -> bool:
         """Whether a quantity moves between the ends and a fold by more than its error; else the signs of its rates are round-off."""

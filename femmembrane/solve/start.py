@@ -4,7 +4,8 @@ One way for every shape, support, material, source, load and control. Its parts 
 
 1. *A bare membrane at a volume*, without sources and loads, which at rest nothing holds (:mod:`.bare`): a guess that encloses the volume,
    solved by Newton's method, by going downhill, or held in its place by dead forces that fade out, whichever arrives first (:mod:`.ways`).
-2. *Sources and loads turned on* there, at constant volume, along the path even where it turns back.
+2. *Sources and loads turned on* there, at constant volume, along the path even where it turns back. Where they pull the membrane onto a
+   body, it lands there: downhill to the minimum in contact.
 3. *The branch through that state* to the load that is asked for, by arc length in both directions.
 
 The order of loading is fixed, so that the answer is one state and not an accident of the optimiser. Where a part does not arrive, or at a
@@ -22,14 +23,15 @@ from ..errors import SolveError, Status
 from ..potential import Potential
 from .banded import negative_among
 from .bare import inflated, moderate, unloaded, usual_volume, without_load
-from .controls import CONTROLS, ControlKind, Controlled, Gas, VolumeControl
+from .contact import coarse_at_edge
+from .controls import CONTROLS, ControlKind, Controlled, Gas, PressureControl, VolumeControl
 from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .newton import NEGLIGIBLE, correct
 from .state import State, at_rest, displacement, distance, flat_state
 from .stepping import march
-from .ways import CORRECTIONS, along, from_guess, sound, well_posed
+from .ways import CORRECTIONS, along, caught, from_guess, sound, well_posed
 
 #: volume, in units of the membrane's own size, below which an equilibrium is looked for from the nearly flat side
 NEARLY_FLAT = 0.05
@@ -111,10 +113,11 @@ def _first_of(ways: Iterator[tuple[str, Way]], wanted: str) -> State:
         if sound(state):
             return state
         spare = spare or state
-        lost += [state] * well_posed(state)
+        # where bodies stop the membrane every way ends there
+        lost += [state] * (well_posed(state) or bool(state.evaluation.potential.obstacles))
     if spare is not None:
         return spare
-    order = [Status.SLACK, Status.LEGENDRE_FAILURE, Status.DIPOLE_CONTACT]
+    order = [Status.NOT_RESOLVED, Status.SLACK, Status.LEGENDRE_FAILURE, Status.DIPOLE_CONTACT]
     failures.sort(key=lambda f: order.index(f.status) if f.status in order else len(order))
     said = f" (first: {failures[0]})" if failures else ""
     status = failures[0].status if failures else Status.NO_EQUILIBRIUM
@@ -188,10 +191,16 @@ def _with_fields(potential: Potential, volume: float) -> State:
     try:
         return march(potential, bare, lambda t: control, 0.0, 1.0, parameter="magnetic")[-1]
     except SolveError as error:
-        state = follow_homotopy(Fields(potential, control), bare.x, bare.pressure)
+        last = (error.result or [bare])[-1]
+        state = caught(potential, control, (last, bare)) if potential.obstacles else None
+        if state is None:
+            state = follow_homotopy(Fields(potential, control), bare.x, bare.pressure)
         if state is not None:
             return state
-        last = (error.result or [bare])[-1]
+        if reason := coarse_at_edge(last.evaluation, anywhere=True):
+            raise SolveError(
+                f"at V = {volume:.6g} no membrane was found that the bodies stop: {reason}", status=Status.NOT_RESOLVED
+            ) from error
         touching = potential.distance_to_sources(last.x) < NEAR * potential.space.unit
         raise SolveError(
             f"{_acting(potential)} could not be turned on to their full strength at V = {volume:.6g}; "
@@ -291,6 +300,12 @@ def _ways_from(
         nearest = usual_volume(potential)
         yield f"the branch through V = {nearest:.6g}", lambda: along(potential, start_at_volume(potential, nearest), held, load, accept)
     for share in (1.0, 10.0, 100.0):  # further out where the first branch ends, or takes too many steps
+        if share == 10.0 and potential.obstacles and held is CONTROLS["pressure"]:
+            for side in sides:
+                yield (
+                    f"downhill onto a body from V = {rest + side * size:.6g}",
+                    lambda side=side: _downhill(potential, load, rest + side * size, accept),  # type: ignore[misc]
+                )
         for side in sides:
             first = rest + side * share * size
             yield (
@@ -315,6 +330,12 @@ def _same(a: State, b: State) -> bool:
 def _is_minimum(state: State) -> bool:
     """Whether a state is a minimum under pressure control."""
     return negative_among(state.evaluation) == 0
+
+
+def _downhill(potential: Potential, pressure: float, volume: float, accept: Callable[[State], bool] | None) -> State | None:
+    """Where bodies stop the membrane at a pressure, from the bare one at a volume."""
+    state = caught(potential, PressureControl(pressure), (inflated(potential, volume),))
+    return state if state is not None and (accept is None or accept(state)) else None
 
 
 def _pull(potential: Potential) -> float:

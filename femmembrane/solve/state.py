@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -92,8 +93,8 @@ def inner(potential: Potential, x: Array, p: float, y: Array, q: float) -> float
 
 def distance(potential: Potential, x: Array, y: Array) -> float:
     """Root mean square of the difference of two displacements over the reference area, in units of the membrane's own size."""
-    d = x - y
-    return float(np.sqrt(max(inner(potential, d, 0.0, d, 0.0), 0.0)))
+    d, space = x - y, potential.space
+    return math.sqrt(max(band_inner(potential.mass, space.half_bandwidth, d, d), 0.0) / (potential.area * space.unit**2))
 
 
 def displacement(potential: Potential, x: Array) -> float:

@@ -21,6 +21,7 @@ from ..potential import Array, Evaluation, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
 from .banded import negative_among
 from .branch import first_point
+from .contact import coarse_at_edge
 from .controls import VolumeControl
 from .finer_space import counterpart, met_across, moved, solved_in, transferred
 from .state import State
@@ -74,6 +75,7 @@ def unresolved(potential: Potential, state: State, scene: Scene | None = None) -
     if not reason:
         return ""
     radius = float(space.kink_radii[where])
+    reason = coarse_at_edge(state.evaluation) or reason
     return f"the mesh does not resolve the membrane at r = {radius:.3g}, where its slope jumps by {worst:.0%}: {reason}"
 
 
@@ -191,7 +193,7 @@ def largest_kink(potential: Potential, x: Array) -> float:
 
 def _kinks(potential: Potential, x: Array) -> Array:
     """:meth:`.Space.kinks`, without those at poles of a sheet magnetised along its meridians: its cone is that of the membrane."""
-    kinks = potential.space.kinks(x)
+    kinks = potential.elements.kinks(potential.space, x)
     if potential.magnetisation is not None and potential.magnetisation.meridional:
         kinks[potential.space.n_elements - 1 :] = 0.0
     return kinks

@@ -8,11 +8,13 @@ load steps asked for.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Evaluation, Family, Potential
+from .contact import coarse_at_edge
 from .controls import CenterHeightControl, Control, Gas, GasOver, VolumeControl
 from .newton import NewtonResult, correct
 from .state import Predictor, State, distance, joined
@@ -71,7 +73,6 @@ def march(
         ``result`` holds the states accepted before.
     """
     path = Predictor() if path is None else path
-    factor_of = (lambda value: magnetic) if parameter == "load" else (lambda value: value)
     if not path.sigma:
         path.append(start, joined(state.x, state.pressure), _carried_slope(potential, state, control_at(start), parameter, start))
     accepted = [state]
@@ -79,11 +80,13 @@ def march(
     spent = 0
     while here != stop:
         there = stop if abs(stop - here) <= abs(step) * (1 + 1e-12) else here + step
-        guess = path.predict(there)
+        guess, control = path.predict(there), control_at(there)
         x, pressure = guess[:-1], float(guess[-1])
-        result = corrector(potential, control_at(there), x, pressure, magnetic=factor_of(there))
+        result = corrector(potential, control, x, pressure, magnetic=magnetic if parameter == "load" else there)
         spent += result.iterations
         reach = distance(potential, x, accepted[-1].x)
+        if potential.unsettled and parameter == "number":  # a body that comes on moves a membrane that nothing has moved before
+            reach = max(reach, abs(there - here) * cast("Family", potential).advance(accepted[-1].evaluation))
         if (
             result.status is Status.CONVERGED
             and distance(potential, result.x, x)
@@ -93,7 +96,7 @@ def march(
             if _through_source(potential, accepted[-1], new, parameter):
                 message = f"the pole would have to pass through a source between {here:.9g} and {there:.9g}"
                 raise SolveError(message, status=Status.DIPOLE_CONTACT, result=accepted)
-            path.append(there, joined(new.x, new.pressure), _carried_slope(potential, new, control_at(there), parameter, there))
+            path.append(there, joined(new.x, new.pressure), _carried_slope(potential, new, control, parameter, there))
             accepted.append(new)
             here, spent = there, 0
             step *= 2
@@ -108,6 +111,8 @@ def march(
                 bad = None if parameter == "magnetic" else apparent(potential, accepted[-1].evaluation)
                 if bad is not None:
                     raise SolveError(f"{message}: {bad}", status=bad.status, result=accepted)
+                if reason := coarse_at_edge(accepted[-1].evaluation):
+                    raise SolveError(f"{message}: {reason}", status=Status.NOT_RESOLVED, result=accepted)
                 raise SolveError(message, status=Status.STEP_UNDERFLOW, result=accepted)
     return accepted[1:]
 
@@ -115,8 +120,7 @@ def march(
 def _through_source(potential: Potential, before: State, after: State, parameter: str) -> bool:
     """Whether the membrane went through a source on a step; while sources are turned on nobody asks."""
     if parameter == "number" and isinstance(potential, Family):
-        member = potential.member
-        return member(after.evaluation.factor).came_through_source(after.x, member(before.evaluation.factor), before.x)
+        return potential.came_through_source(after.evaluation.factor, after.x, before.evaluation.factor, before.x)
     return parameter == "load" and bool(after.evaluation.factor) and potential.passed_source(before.x, after.x)
 
 
@@ -141,11 +145,16 @@ def _carried_slope(potential: Potential, state: State, control: Control, paramet
 def _slope(potential: Potential, state: State, control: Control, parameter: str, value: float) -> tuple[Array, float]:
     """Derivative of (x, P) with respect to the parameter."""
     space, evaluation = potential.space, state.evaluation
-    _, row, corner = control.equation(space, state.x, state.pressure, evaluation)
+    _, row, corner = control.equation(space, evaluation.x, state.pressure, evaluation)
     bordered = evaluation.border(row, corner)
     if parameter == "load":
-        return bordered.solve(np.zeros_like(state.x), 1.0)  # N = (quantity - load)
+        return bordered.solve(np.zeros(len(state.x)), 1.0)  # N = (quantity - load)
     if parameter == "number" and isinstance(potential, Family):
-        rate = control_rate(potential, control, state.x, state.pressure, evaluation)
-        return bordered.solve(-potential.number_derivative(state.x, state.pressure, value), -rate)
+        rate = control_rate(potential, control, evaluation.x, state.pressure, evaluation)
+        force, shift = potential.number_rates(evaluation, state.pressure)
+        if shift is None:
+            return bordered.solve(-force, -rate)
+        row = control.equation(space, evaluation.x, state.pressure, evaluation.raw)[1]
+        dx, dp = bordered.solve(-force, -rate - float(row @ shift))
+        return dx + shift, dp
     return bordered.solve(-evaluation.potential.factor_derivative(evaluation, state.pressure, value), 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .continuation import BranchPoint, StepControl, Tracer, trace_points
 from .controls import CONTROLS, Control, ControlKind, Gas
 from .guess import guess_at_volume
 from .homotopy import Held, follow_homotopy
-from .minimize import minimize
+from .minimize import is_minimum, minimize
 from .newton import correct
 from .segment import Segment
 from .state import Predictor, State
@@ -23,6 +23,8 @@ from .wellposed import ill_posed, is_slack, slackness, unresolved_source
 
 #: size of displacement and pressure, in units of the membrane, at which a branch is left: nothing there comes back
 HUGE = 1e12
+#: what can be held while the membrane goes downhill
+DOWNHILL = (CONTROLS["volume"], CONTROLS["pressure"])
 #: most corrections of a guess
 CORRECTIONS = 40
 #: most steps along a branch in each direction
@@ -74,6 +76,42 @@ def along(
     if failure is not None:
         raise failure
     return None
+
+
+def caught(potential: Potential, control: Control, states: Iterable[State], magnetic: float = 1.0) -> State | None:
+    """A state in which bodies stop the membrane: downhill from where it cannot stay.
+
+    Beyond pull-in no equilibrium is near. A body that keeps the membrane away from the singular field bounds the energy from below, so that
+    there is a minimum in contact with it.
+
+    Parameters
+    ----------
+    potential : Potential
+        With bodies.
+    control : VolumeControl or PressureControl
+    states : iterable of State
+        From which it goes downhill, until one arrives at a sound state.
+    magnetic : float
+        Factor on sources and loads.
+
+    Returns
+    -------
+    State or None
+        A minimum; one that is not sound where no other was met.
+    """
+    spare = None
+    for state in states:
+        with np.errstate(all="ignore"):  # a trial may be absurd: it is refused by its result
+            found, pressure, _, _ = minimize(potential, control, state.x, state.pressure, magnetic=magnetic)
+            if not (np.isfinite(found).all() and np.isfinite(pressure)):
+                continue
+            result = correct(potential, control, found, pressure, magnetic=magnetic)
+        if result.status is Status.CONVERGED and is_minimum(potential, control, result.evaluation):
+            landed = State.of(result)
+            if sound(landed):
+                return landed
+            spare = spare or landed
+    return spare
 
 
 def _first_met(

@@ -8,6 +8,7 @@ tangential one supports it. In place of the meridional stress stands the *suppor
 :func:`supporting`.
 
 A stress that a mesh does not resolve has a sign of the mesh's: slopes of a layer or a needle swing about the true ones within an element.
+What a body presses flat is held by that against short waves, whatever its stress.
 Compression is pronounced where it exceeds the variation of the stress from element to element, or holds in finer spaces too. Finer
 spaces may contradict it. Where the state is not found in them, nothing is known of the membrane but what the one mesh shows.
 """
@@ -148,6 +149,10 @@ def supporting(evaluation: Evaluation) -> Array:
     long as the one with respect to the stretch is.
     """
     potential = evaluation.potential
+    pressed = None if potential.scene.tension_field else evaluation.pressed_flat()
+    if pressed is not None and not potential.tilts:
+        stress = evaluation.stress.reshape(2, *potential.space.R.shape)
+        return np.where(pressed, np.maximum(stress, 0.0), stress).reshape(2, -1)
     if not potential.tilts:
         return evaluation.stress
     along, mixed, across = _along_meridian(evaluation)

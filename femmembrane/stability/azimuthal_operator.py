@@ -138,18 +138,20 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     if bending is not None:
         band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
     reduction = None
-    if potential.obstacles:  # a scene has bodies or bending
-        band, reduction = _against_bodies(potential, x, pressure, layout, band)
+    if potential.obstacles:
+        band, reduction = _against_bodies(potential, x, pressure, layout, band, kd)
     if reduction is not None:
         lightest = np.full(reduction.out.shape, np.abs(mass[2 * kd]).min())
         mass = reduction.band(mass, kd, lightest)
-        rigid, spin = (None if part is None else reduction.reduced(part) for part in (rigid, spin))
+        rigid, spin, spring = (None if part is None else reduction.reduced(part) for part in (rigid, spin, spring))
     return AzimuthalOperator(
         band, mass, kd, layout.numbers, int(n), response, space, density, rigid, spin, spring, bending=bending, reduction=reduction
     )
 
 
-def _against_bodies(potential: Potential, x: Array, pressure: float, layout: WaveUnknowns, band: Array) -> tuple[Array, Reduction | None]:
+def _against_bodies(
+    potential: Potential, x: Array, pressure: float, layout: WaveUnknowns, band: Array, kd: int
+) -> tuple[Array, Reduction | None]:
     """The matrix with what bodies add and take, and who takes vectors there; unchanged and None where none is touched.
 
     A body of which a node keeps the distance 0 leaves it the tangential displacement and the one around the axis. The force that it pushes
@@ -159,7 +161,7 @@ def _against_bodies(potential: Potential, x: Array, pressure: float, layout: Wav
     held, gaps, n = evaluation.held, evaluation.gaps, layout.n_free
     if not held.any():
         return band, None
-    own, kd = cast("ContactPotential", potential), layout.half_bandwidth
+    own = cast("ContactPotential", potential)
     numbers = layout.numbers[potential.space.nodes[own.nodes[held]]]
     a, c, b = (numbers[:, k] for k in (RADIAL, AROUND, VERTICAL))
     n_rho, n_eta, force = gaps.n_rho[held], gaps.n_eta[held], evaluation.forces[held]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,19 +54,20 @@ def checked_verdict(
     """
     if azimuthal == ALL:
         return _worst_verdict(potential, x, pressure, evaluation, control)
-    azimuthal = whole("azimuthal", azimuthal, least=0, most=MAX_WAVES)
-    if azimuthal and control is not None:
-        raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
-    if not azimuthal and control is None:
+    if azimuthal:
+        azimuthal = whole("azimuthal", azimuthal, least=0, most=MAX_WAVES)
+        if control is not None:
+            raise InputError("control", control, f"n = {azimuthal} waves do not change the volume: leave the control out")
+    elif control is None:
         raise InputError("control", control, "one of " + ", ".join(CONTROLS) + " is allowed, or azimuthal=1, 2, ...")
-    ask = partial(_verdict, control=control, azimuthal=azimuthal, compliance=compliance)
+    asked = Question(control, int(azimuthal), compliance)
     try:
-        verdict = ask(potential, x, pressure, evaluation, guess=guess)
+        verdict = _verdict(asked, potential, x, pressure, evaluation, guess)
     except SpectrumError as error:  # a verdict that cannot be proved must not end the run that asked for it
-        return Verdict(None, np.nan, np.nan, control, azimuthal, None, f"not decided: {error}")
+        return Verdict(None, np.nan, np.nan, control, asked.azimuthal, None, f"not decided: {error}")
     value = abs(verdict.smallest_eigenvalue)
     if value < max(small_eigenvalue(potential.space), _CLEAR * verdict._unresolved):  # never for NaN
-        verdict = _with_discretisation_error(verdict, potential, pressure, evaluation, ask)
+        verdict = _with_discretisation_error(verdict, potential, pressure, evaluation, asked)
         if np.isinf(verdict._unresolved):
             verdict = replace(verdict, reason=f"{verdict.reason}; {_FALSE}")
     return verdict
@@ -86,32 +86,31 @@ def _worst_verdict(potential: Potential, x: Array, pressure: float, evaluation: 
     return replace(verdict, reason=f"{verdict.reason}; {found}")
 
 
+class Question(NamedTuple):
+    """Against what a state is judged."""
+
+    control: str | None
+    azimuthal: int
+    compliance: float | None
+
+
 def _verdict(
-    potential: Potential,
-    x: Array,
-    pressure: float,
-    evaluation: Evaluation,
-    *,
-    control: str | None,
-    azimuthal: int,
-    compliance: float | None,
-    guess: Array | None = None,
+    asked: Question, potential: Potential, x: Array, pressure: float, evaluation: Evaluation, guess: Array | None = None
 ) -> Verdict:
+    control, azimuthal, compliance = asked
     if azimuthal or control is None:
         return azimuthal_verdict(potential, x, pressure, azimuthal, guess)
     return axisymmetric_verdict(potential, evaluation, control, guess, compliance)
 
 
-def _with_discretisation_error(
-    verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict]
-) -> Verdict:
+def _with_discretisation_error(verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, asked: Question) -> Verdict:
     """Solve again on elements of one degree more (or half the size). The change of an eigenvalue decides whether its sign is known.
 
     The sign may stay open although the mesh is too coarse to call the eigenvalue zero. A still finer space is then tried, and its answer is
     reported.
     """
     value, unknown = verdict.smallest_eigenvalue, _CLEAR * verdict._unresolved
-    better = _finer_verdict(verdict, potential, pressure, evaluation, ask, 1)
+    better = _finer_verdict(verdict, potential, pressure, evaluation, asked, 1)
     if better is None:  # there is nothing to compare with: the unresolved part stands for the error
         return verdict if abs(value) >= unknown else _open(verdict, unknown)
     change = abs(better.smallest_eigenvalue - value)
@@ -122,7 +121,7 @@ def _with_discretisation_error(
     if abs(value) <= error and min(abs(value), error) <= zero:
         reason = f"marginal: the smallest eigenvalue {value:.3g} is zero within its discretisation error {error:.1g}"
         return replace(verdict, stable=None, error=error, reason=reason)
-    best = _finer_verdict(verdict, potential, pressure, evaluation, ask, 2)
+    best = _finer_verdict(verdict, potential, pressure, evaluation, asked, 2)
     if best is None:
         return _open(verdict, error)
     rest = abs(best.smallest_eigenvalue - better.smallest_eigenvalue)
@@ -140,7 +139,7 @@ def _with_discretisation_error(
 
 
 def _finer_verdict(
-    verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, ask: Callable[..., Verdict], level: int
+    verdict: Verdict, potential: Potential, pressure: float, evaluation: Evaluation, asked: Question, level: int
 ) -> Verdict | None:
     """The same question about the same state in a finer space, the mode interpolated; None where there is no answer."""
     # the volume is held, unless this eigenvalue vanishes at volume folds
@@ -150,7 +149,7 @@ def _finer_verdict(
         return None
     finer = found.evaluation.potential
     try:
-        better = ask(finer, found.evaluation.x, found.pressure, found.evaluation)
+        better = _verdict(asked, finer, found.evaluation.x, found.pressure, found.evaluation)
     except SpectrumError:
         return None
     if better.coefficients is None:

@@ -27,7 +27,7 @@ from ..threads import cached_property
 _TOLERANCES = Rayleigh()
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class SmallestEigenvalue:
     """Smallest eigenvalue with its mode (M-normalised), the number of negative directions, and a bound on the algebraic error."""
 

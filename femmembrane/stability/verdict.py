@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -45,38 +44,30 @@ def axisymmetric_verdict(
     form = bending_form(potential, evaluation.x)
     bending = None if form is None else form.at(0)
     shown = apparent(potential, evaluation)
-    bad = None if shown is None else unbounded_below(potential, evaluation, bending)
-    if bad is not None and slack_all_over(evaluation):
-        return slack_verdict(control, 0)
-    if bad is not None:
+    if shown is not None and (bad := unbounded_below(potential, evaluation, bending)) is not None:
+        if slack_all_over(evaluation):
+            return slack_verdict(control, 0)
         return short_wave_verdict(f"{bad}, and the spectrum has no lower bound under refinement", bad.confirmed, control, 0)
     if control == "gas" and compliance is None:
         raise InputError("gas", None, 'a verdict under "gas" needs the gas: pass gas=Gas(amount=..., chamber=...)')
     constraint = None if control == "pressure" else evaluation.volume_gradient
     soft = compliance or 0.0 if control == "gas" else 0.0
-    found = _smallest(potential, evaluation, bending, constraint, soft, guess)
+
+    def smallest(held: Evaluation) -> SmallestEigenvalue:
+        """With the nodes held that bodies hold in an evaluation."""
+        start = None if guess is None else held.reduced(guess)
+        found = smallest_of(axisymmetric_pencil(potential, held, bending, constraint, soft), start)
+        found.mode = held.expanded(found.mode)
+        return found
+
+    found = smallest(evaluation)
     if (free := evaluation.released()) is not None:
-        return _between(found, _smallest(potential, free, bending, constraint, soft, guess), control, potential)
+        return _between(found, smallest(free), control, potential)
     shape = partial(mode_shape, potential.space)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     doubtful = shown is not None and not (bending is not None and bending.positive)
     unresolved = np.inf if doubtful else unresolved_axisymmetric(evaluation, found.mode, bending)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
-
-
-def _smallest(
-    potential: Potential,
-    evaluation: Evaluation,
-    bending: Bending | None,
-    constraint: Array | None,
-    compliance: float,
-    guess: Array | None,
-) -> SmallestEigenvalue:
-    """The smallest eigenvalue of a state, with the nodes held that bodies hold in its evaluation."""
-    start = None if guess is None else evaluation.reduced(guess)
-    found = smallest_of(axisymmetric_pencil(potential, evaluation, bending, constraint, compliance), start)
-    mode = evaluation.expanded(found.mode)
-    return found if mode is found.mode else replace(found, mode=mode)
 
 
 def _between(held: SmallestEigenvalue, free: SmallestEigenvalue, control: str, potential: Potential) -> Verdict:
@@ -102,8 +93,11 @@ def axisymmetric_pencil(
     band, mass, kd = evaluation.band, evaluation.reduced_mass(potential.mass), potential.space.half_bandwidth
     constraint = None if constraint is None else evaluation.reduced(constraint)
     if bending is not None:
-        band, mass, kd = bending.added_to(band, kd), widened(mass, kd, bending.half_bandwidth), bending.half_bandwidth
-    return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, evaluation.spring)
+        wide = bending.half_bandwidth
+        band = widened(band, kd, wide) + evaluation.reduced_form(bending.band, wide)
+        mass, kd = widened(mass, kd, wide), wide
+    spring = None if evaluation.spring is None else evaluation.reduced(evaluation.spring)
+    return pencil_of(band, mass, kd, constraint, compliance, potential.rigid, spring)
 
 
 def unbounded_below(potential: Potential, evaluation: Evaluation, bending: Bending | None) -> IllPosed | None:

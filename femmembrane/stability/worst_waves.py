@@ -19,17 +19,22 @@ each whether an eigenvalue lies below the lowest that was found; if so it become
 from __future__ import annotations
 
 from math import ceil
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from ..physics.loads import over_projection
 from ..potential import Array, Evaluation, Potential
+from ..results.contact import contact_of
 from ..scene import MAX_WAVES
 from .acoustic import supporting_all
 from .azimuthal_operator import azimuthal_operator
 from .bending import BendingForm, bending_form
 from .second_variation import response_at_quadrature
 from .spectrum import Pencil, SmallestEigenvalue, smallest_of
+
+if TYPE_CHECKING:
+    from ..potential.contact import ContactEvaluation
 
 #: numbers of waves that are all looked at, and the steps beyond them: of the first search, and of the count
 _FIRST, _COARSE, _FINE = 8, 1.25, 1.04
@@ -122,6 +127,8 @@ def _limit(potential: Potential, x: Array, pressure: float, evaluation: Evaluati
     push = (abs(pressure) + slope) * area
     gain = gain + push * (np.abs(kappa_1) + np.abs(kappa_2)) + push**2 / (4 * np.maximum(r.A, np.finfo(float).tiny))
     gain = gain + curvature * area + above * thickness
+    if potential.obstacles:
+        gain = gain + _along_bodies(cast("ContactEvaluation", evaluation), area)
     if potential.scene.bending:
         d11, _, d22, _ = form.moduli
         gain = gain + np.minimum(s1, 0.0) ** 2 / (4 * d11)
@@ -133,3 +140,11 @@ def _limit(potential: Potential, x: Array, pressure: float, evaluation: Evaluati
             square = np.divide(gain, np.maximum(s2, 0.0), out=nothing, where=gain > 0)
     largest = float((r.rho * np.sqrt(square)).max())
     return int(min(max(largest, _FIRST), MAX_WAVES)) if np.isfinite(largest) else MAX_WAVES
+
+
+def _along_bodies(evaluation: ContactEvaluation, area: Array) -> Array:
+    """What motions along bodies can gain per reference area: the pressure of contact times the largest curvature under them."""
+    gaps, space = evaluation.gaps, evaluation.potential.space
+    curvature = np.maximum(gaps.curvature, gaps.circle)[evaluation.held].max(initial=0.0)
+    pressure = contact_of(evaluation).pressure(space.s.ravel()).reshape(space.R.shape) if curvature else np.zeros_like(space.R)
+    return pressure * curvature * area

@@ -105,8 +105,6 @@ def fold_curve(
     P = 2.1605 at 0.05, P = 1.8792 at 0.00
     """
     check_scene(scene)
-    if scene.bodies:
-        raise InputError("parameter", parameter, "folds are not followed beside an obstacle; a trace for each value is allowed")
     named = Parameter(scene, parameter)
     low, high = _bounds(named, bounds, direction)
     check_ill_posed(ill_posed)
@@ -209,7 +207,9 @@ class FoldRun(Run[FoldCurve]):
         _check_start(start, family)
         self.request, self.parameter, self.bounds = request, request.parameter, request.bounds
         self.problem = FoldProblem(family, start.kind, self.bounds[1] - self.bounds[0], self.bounds)
-        self.point = first_fold(self.problem, start.equilibrium.state, start.pressure, self.parameter.value, request.direction)
+        eq = start.equilibrium
+        x = eq.potential.evaluate(eq.state, eq.pressure).carried(eq.state) if eq.scene.borders else eq.state
+        self.point = first_fold(self.problem, x, start.pressure, self.parameter.value, request.direction)
         self.cusps: list[Cusp] = []
         self.closed, self.made = False, 0
         self.timings["setup"] = time.perf_counter() - clock
@@ -275,12 +275,13 @@ class FoldRun(Run[FoldCurve]):
 
     def _record(self, point: NumberPoint) -> Equilibrium:
         potential, evaluation = self._own(point)
-        return record(self.parameter.scene_at(point.number), potential, replace(point.state, evaluation=evaluation))
+        scene = self.parameter.scene_at(point.number).bordered(potential.borders)
+        return record(scene, potential, replace(point.state, evaluation=evaluation))
 
     def _own(self, point: NumberPoint) -> tuple[Potential, Evaluation]:
         """Potential and evaluation of a point as one of its own scene."""
-        potential = self.problem.family.member(point.number)
-        return potential, potential.evaluate(point.state.x, point.state.pressure)
+        evaluation = self.problem.family.home(point.state.evaluation, point.state.pressure)
+        return evaluation.potential, evaluation
 
     def _clearance(self, point: NumberPoint) -> float:
         """Smallest distance between a node and a source."""

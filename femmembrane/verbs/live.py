@@ -15,6 +15,7 @@ from ..errors import InputError, SolveError
 from ..results.branch import Branch
 from ..scene import Run, Scene
 from ..scene.variation import Parameter, names
+from ..solve.continuation import StepControl
 from .follow import equilibrium, run
 from .trace import trace
 
@@ -24,6 +25,8 @@ ELEMENTS = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 _VERDICTS = ("pressure", "volume")
 #: what a run may prescribe that a trace follows as well, by the names that ``until`` has for them
 _FOLLOWED = {"volume": "volume", "pressure": "pressure", "height": "center_height"}
+#: steps of a branch that is drawn anew many times a second: longer than those of a run, for between them it is drawn along cubics
+_STRIDES = StepControl(largest=1.0, deviation=2e-3)
 #: a slider spans these multiples of a number, and this much about zero
 _SPAN, _ABOUT_ZERO = 2.0, 1.0
 
@@ -138,7 +141,7 @@ class LiveScene:
         start: Any = first if until == "volume" else equilibrium(scene, **held)
         if first == last:
             return trace(scene, start=start, max_steps=1)
-        return trace(scene, start=start, until={until: last}, direction=1 if last > first else -1)
+        return trace(scene, start=start, until={until: last}, direction=1 if last > first else -1, steps=_STRIDES)
 
 
 def _slider(number: Parameter) -> Slider:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..checks import number
 from ..errors import InputError, unknown_name
-from ..potential import Family, Potential
+from ..potential import ContactFamily, Family, Potential
 from ..scene import Scene
 from ..scene.run import GAS, PRESCRIBED
 from ..scene.variation import Parameter, names
@@ -92,8 +92,6 @@ def checked_number(key: str, scene: Scene, over: Any) -> Parameter:
     InputError
         For a name that the scene does not have.
     """
-    if scene.bodies:
-        raise InputError(key, over, "not done beside an obstacle; a run for each scene, with start=, is allowed")
     if over in HELD:
         allowed = ", ".join(names(scene)) or "(this scene has none)"
         raise InputError(key, over, f"no number of the scene; inflate, pressurize and trace follow it as it is. Numbers: {allowed}")
@@ -105,6 +103,8 @@ def checked_number(key: str, scene: Scene, over: Any) -> Parameter:
 
 def family_of(parameter: Parameter) -> Family:
     """The potential of the scenes that differ in a number."""
+    if parameter.scene.bodies:
+        return ContactFamily(parameter)
     return Family(parameter.scene, parameter.vary, scene_at=parameter.scene_at, even=parameter.even)
 
 
@@ -133,11 +133,11 @@ class OverNumber:
         return self.parameter.name
 
     def own(self, state: State) -> State:
-        member = self.family.member(state.evaluation.factor)
-        return replace(state, evaluation=member.evaluate(state.x, state.pressure))
+        return replace(state, evaluation=self.family.home(state.evaluation, state.pressure))
 
     def scene_of(self, state: State) -> Scene:
-        return self.family.member(state.evaluation.factor).scene
+        own = state.evaluation.potential
+        return self.family.member(state.evaluation.factor).scene.bordered(own.borders)
 
     def potential_at(self, point: BranchPoint) -> Potential:
         return self.family.member(point.state.evaluation.factor)
@@ -145,7 +145,7 @@ class OverNumber:
     def refuse_idle(self, state: State) -> None:
         """Raise InputError for a number that changes no force on the membrane."""
         # a chamber acts on the gas, and a flat sheet that is stretched stays flat
-        if self.parameter.name.startswith("chamber.") or self.family.moves:
+        if self.parameter.name.startswith("chamber.") or self.family.moves or self.parameter.shapes:
             return
         family, value = self.family, state.evaluation.factor
         if self.parameter.even:  # at 0 all derivatives vanish

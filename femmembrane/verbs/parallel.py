@@ -113,7 +113,10 @@ def _processes(workers: int) -> Iterator[Executor]:
     try:
         yield executor
     except BaseException:
+        running = list((executor._processes or {}).values())
         executor.shutdown(wait=False, cancel_futures=True)
+        for process in running:  # what they compute is lost in any case, and Python would wait for it when it ends
+            process.terminate()
         raise
     executor.shutdown()
 

@@ -11,8 +11,8 @@ import numpy as np
 from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
 from ..errors import InputError, SolveError, Status
-from ..potential import Potential
-from ..results.analyses import asked
+from ..potential import ContactFamily, Potential
+from ..results.analyses import answer_at_once
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium, recorded
 from ..results.path_memory import PathMemory
@@ -66,7 +66,8 @@ def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> Sta
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     if potential.obstacles:
-        potential = kept.potential
+        borders = kept.scene.borders
+        potential = potential.bordered(borders) if isinstance(potential, ContactFamily) else kept.potential
     evaluation = potential.evaluate(kept.state, kept.pressure, number)
     force = evaluation.gradient - kept.pressure * evaluation.volume_gradient
     residual = relative_residual(potential, force, evaluation, kept.pressure)
@@ -102,8 +103,7 @@ def record(
     status = state.status if bad is None else bad.status
     own = state.evaluation
     equilibrium = recorded(scene, potential, own.x, state.pressure, own, status, state.residual, state.iterations, gas)
-    for analysis in asked(scene):
-        analysis.compute(equilibrium, previous, state.evaluation)
+    answer_at_once(equilibrium, previous, own)
     if clock is not None:  # written last, for answers take time
         store(equilibrium, seconds=time.perf_counter() - clock)
     return equilibrium
@@ -127,8 +127,10 @@ def record_on_borders(
     found = put_on_borders(scene, scene, state, solve)
     if found.scene is scene:
         return record(scene, potential, state, previous, clock, gas)
-    new = record(found.scene, found.state.evaluation.potential, found.state, previous, clock, gas)
-    there = potential, state.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    own = found.state.evaluation.potential
+    moved = found.scene.bordered(own.scene.borders) if own.obstacles else found.scene
+    new = record(moved, own, found.state, previous, clock, gas)
+    there = potential, state.evaluation.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
     store(new, on_branch=recorded(scene, *there))
     return new
 

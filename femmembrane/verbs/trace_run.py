@@ -311,6 +311,8 @@ class TraceRun(Run[Branch]):
         try:
             return self._step()
         except SolveError as error:
+            if error.status is Status.NOT_RESOLVED:
+                return error.status, str(error)
             near = self.potential_at(self.point).distance_to_sources(self.point.state.x)
             return stopped_by_source(error, near, self.potential.space.unit) or (error.status, str(error))
 
@@ -343,7 +345,7 @@ class TraceRun(Run[Branch]):
             if (end := self._ill_posed(self.point)) is not None:  # continued from where it had ended
                 return end
             self._points = trace_points(self.problem, self.point, self.tracer)
-        before = replace(self.tracer)
+        before = None if self.along is None or self._again else replace(self.tracer, path=replace(self.tracer.path))
         with self.timed("solve"):
             new = next(self._points)
         segment = Segment(self.problem, self.point, new, leaving=self._crossing is not None and len(self.found) == 1)
@@ -351,7 +353,7 @@ class TraceRun(Run[Branch]):
         last = min(met, key=lambda p: p.sigma, default=None)
         unresolved = state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state))
         share = self._share(last or new, bool(unresolved))
-        if self.along is not None and share > self.along.most and not self._again:
+        if self.along is not None and before is not None and share > self.along.most:
             return self._step_again(self.along, before, last or new, share)
         if unresolved:
             return Status.NOT_RESOLVED, f"at {self.place(last or new)} {unresolved}"
@@ -480,7 +482,8 @@ class TraceRun(Run[Branch]):
     def _add(self, point: BranchPoint, clock: float) -> None:
         with self.timed("verdicts"):
             scene, state = self.scene_of(point.state), self.own(point.state)
-            new = record_on_borders(scene, state, self.solve(point), self.found[-1] if self.found else None, clock)
+            solve: Solve = lambda onto, found: self.solve(point)(onto, found)  # noqa: E731  # hardly ever asked for
+            new = record_on_borders(scene, state, solve, self.found[-1] if self.found else None, clock)
         self.found.append(new)
         if self.on_step is not None:
             self.on_step(len(self.found) - 1, self.request.max_steps + 1, new)

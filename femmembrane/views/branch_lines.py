@@ -16,7 +16,7 @@ from ..results.curve import half_way, turning
 from ..results.postbuckling import SUBCRITICAL, UNKNOWN
 from ..results.special_point import SpecialPoint
 from ..scene import ALL
-from .figures import AMONG, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
+from .figures import AMONG, COLORS, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
 from .labels import add_label
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
 
@@ -31,8 +31,6 @@ Array = NDArray[np.float64]
 
 #: branches of up to so many equilibria show them as dots
 _DOTS = 40
-#: colours of several branches in one picture: for the colour-blind too, and of different lightness
-COLORS = ("#0072b2", "#d55e00", "#222222", "#56b4e9", "#a01040", "#e69f00", "#009e73")
 #: what tells the entry of a branch in a legend from other lines
 _BRANCH = "femmembrane branch"
 #: marker and name of each kind of special point
@@ -43,6 +41,8 @@ MARKERS = {
     "number_fold": ("h", "limit point in the number"),
     "branch_point": ("D", "branch point"),
     "azimuthal_onset": ("v", "azimuthal onset"),
+    "touch": (">", "first touch of a body"),
+    "release": ("<", "last touch of a body"),
 }
 
 
@@ -77,7 +77,7 @@ def draw_branch(
     style : Style, optional
         One style for the whole line, in place of the verdicts'.
     label : str, optional
-        Name of the branch among several. It then has the next of :data:`COLORS`, and dashes tell the verdicts.
+        Name of the branch among several. It then has the next of :data:`.figures.COLORS`, and dashes tell the verdicts.
     dots : bool, optional
         Show each equilibrium as a dot; by default when there are few.
     special_points : bool

@@ -1,9 +1,14 @@
 "use strict";
 // The page has a branch as data (explorer_data.py says what is in it). Plotly draws; this file says what, and reacts to hands and keys.
 const byId = (id) => document.getElementById(id);
-const SECTORS = 48, FRAME = 50, AMPLITUDE = 0.12;
+const SECTORS = 48, PER_WAVE = 8, MOST_SECTORS = 960, FRAME = 50, AMPLITUDE = 0.12, OF_A_WAVE = 0.35;
+const SNAP = "#c2184e";
 const MARKERS = { limit_point: "circle", volume_fold: "square", height_fold: "triangle-up", number_fold: "hexagon",
-  branch_point: "diamond", azimuthal_onset: "triangle-down" };
+  branch_point: "diamond", azimuthal_onset: "triangle-down", touch: "triangle-right", release: "triangle-left" };
+// the same markers as polygons, for the key below the diagram
+const CORNERS = { square: "-4,-4 4,-4 4,4 -4,4", "triangle-up": "0,-5 5,4 -5,4", hexagon: "-5,0 -2.5,-4.4 2.5,-4.4 5,0 2.5,4.4 -2.5,4.4",
+  diamond: "0,-6 6,0 0,6 -6,0", "triangle-down": "0,5 5,-4 -5,-4", "triangle-right": "5,0 -4,5 -4,-5", "triangle-left": "-5,0 4,5 4,-5",
+  x: "-4,-4 4,4 0,0 4,-4 -4,4 0,0" };
 const ZONED = "zone", night = matchMedia("(prefers-color-scheme: dark)"), calm = matchMedia("(prefers-reduced-motion: reduce)");
 let data = JSON.parse(byId("data").textContent);
 let now = 0, shown = 0, phase = 1, motion = null, playing = null, compared = [];
@@ -47,36 +52,70 @@ const joined = (parts, c) => parts.flatMap((part, k) => (k ? [null, ...part.valu
 const grouped = (lines) => [...Map.groupBy(lines, (line) => line.label).values()];
 function strands(of, x, y, look) {
   return grouped(of).map((same) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", name: same[0].label, x: joined(same, x),
-    y: joined(same, y), ...look(same[0]) }));
+    y: joined(same, y), line: { ...look(same[0]), simplify: false } }));
 }
+// An onset after which the membrane jumps has a filled marker. Plotly's own legend would be laid out anew at every redraw, which takes as
+// long as all the rest: what lines and markers mean stands below the diagram instead.
+const markerOf = (s) => ({ symbol: MARKERS[s.kind] || "x", fill: s.after === "subcritical" ? css("--ink") : css("--paper") });
 function diagram() {
   const [x, y] = ["across", "up"].map((id) => column(byId(id).value)), states = data.states;
-  const own = (line) => ({ line: { color: ink(line), dash: line.dash, width: line.width } });
+  const own = (line) => ({ color: ink(line), dash: line.dash, width: line.width });
   const traces = [
-    ...compared.flatMap((c) => strands(c.lines, x, y, (line) => ({ name: c.label, legendgroup: c.label,
-      showlegend: line.label === c.lines[0].label, line: { color: c.color, dash: line.dash, width: line.width } }))),
-    ...strands(data.bands, x, y, (band) => ({ line: { color: ink(band), width: 10 } })),
+    ...compared.flatMap((c) => strands(c.lines, x, y, (line) => ({ color: c.color, dash: line.dash, width: line.width }))),
+    ...strands(data.bands, x, y, (band) => ({ color: ink(band), width: 10 })),
     ...strands(data.lines, x, y, own),
-    ...data.snaps.map((snap, k) => ({ type: "scatter", mode: "lines+markers", hoverinfo: "skip", name: "snap", showlegend: !k, x: snap[x],
-      y: snap[y], line: { color: "#c2184e", width: 2 }, marker: { symbol: "arrow", size: [0, 12], angleref: "previous", color: "#c2184e" } })),
+    ...data.snaps.map((snap) => ({ type: "scatter", mode: "lines+markers", hoverinfo: "skip", name: "snap", x: snap[x], y: snap[y],
+      line: { color: SNAP, width: 2 }, marker: { symbol: "arrow", size: [0, 12], angleref: "previous", color: SNAP } })),
   ];
-  const steps = states.map((s, k) => k).filter((k) => !states[k].kind), points = states.map((s, k) => k).filter((k) => states[k].kind);
+  const points = states.map((s, k) => k).filter((k) => states[k].kind);
   const hover = (k) => `${states[k].name}<br>${data.quantities[x].label}: ${text(states[k].values[x])}<br>` +
     `${data.quantities[y].label}: ${text(states[k].values[y])}`;
   const at = (which, more) => ({ type: "scatter", mode: "markers", x: which.map((k) => states[k].values[x]),
-    y: which.map((k) => states[k].values[y]), customdata: which, hovertext: which.map(hover), hoverinfo: "text", ...more });
-  traces.push(at(steps, { name: "steps", showlegend: false, marker: { size: 6, color: css("--soft"), opacity: 0.55 } }));
-  for (const kind of new Set(points.map((k) => states[k].kind))) {
-    const which = points.filter((k) => states[k].kind === kind);
-    traces.push(at(which, { name: states[which[0]].name.replace(/, n = \d+$/, ""), marker: { size: 10, symbol: MARKERS[kind] || "x",
-      color: css("--paper"), line: { color: css("--ink"), width: 1.6 } } }));
+    y: which.map((k) => states[k].values[y]), ...more });
+  const told = (which) => ({ customdata: which, hovertext: which.map(hover), hoverinfo: "text" });
+  const steps = states.map((s, k) => k).filter((k) => !states[k].kind);
+  traces.push(at(steps, { ...told(steps), name: "steps", marker: { size: 6, color: css("--soft"), opacity: 0.55 } }));
+  for (const same of Map.groupBy(points, (k) => `${states[k].kind} ${states[k].after}`).values()) {
+    const look = markerOf(states[same[0]]);
+    traces.push(at(same, { ...told(same), name: states[same[0]].word, marker: { size: 10, symbol: look.symbol, color: look.fill,
+      line: { color: css("--ink"), width: 1.6 } } }));
   }
-  traces.push({ ...at([shown], {}), name: "shown", showlegend: false, hoverinfo: "skip",
+  traces.push({ ...at([shown], {}), name: "shown", hoverinfo: "skip",
     marker: { size: 17, color: "rgba(0,0,0,0)", line: { color: css("--accent"), width: 3 } } });
-  const layout = frame(data.quantities[x].label, data.quantities[y].label);
-  layout.legend = { ...below(0.2), title: { text: data.heading } };
-  layout.showlegend = true;
+  const layout = { ...frame(data.quantities[x].label, data.quantities[y].label), showlegend: false };
   Plotly.react("diagram", traces, layout, { responsive: true, displaylogo: false });
+  byId("diagram").parentElement.classList.remove("sketched");
+  key();
+}
+const drawing = (tag, look) => {
+  const part = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(look)) part.setAttribute(name, value);
+  return part;
+};
+const sample = (line, width) => drawing("line", { x1: 0, y1: 7, x2: 34, y2: 7, stroke: line.color, "stroke-width": width || line.width,
+  "stroke-dasharray": line.dash && line.dash !== "solid" ? line.dash : "none" });
+const polygon = (look) => {
+  const drawn = { transform: "translate(17 7)", fill: look.fill, stroke: css("--ink"), "stroke-width": 1.6 };
+  return look.symbol === "circle" ? drawing("circle", { ...drawn, r: 5 }) : drawing("polygon", { ...drawn, points: CORNERS[look.symbol] });
+};
+function key() {
+  const points = [...new Map(data.states.filter((s) => s.kind).map((s) => [s.word, s])).values()];
+  const entries = [
+    ...compared.map((c) => [c.label, sample({ color: c.color, width: 3 })]),
+    ...grouped(data.lines).map(([line]) => [line.label, sample({ color: ink(line), dash: line.dash, width: line.width })]),
+    ...grouped(data.bands).map(([band]) => [band.label, sample({ color: ink(band) }, 10)]),
+    ...(data.snaps.length ? [["snap", sample({ color: SNAP, width: 2 })]] : []),
+    ...points.map((s) => [s.word, polygon(markerOf(s))]),
+  ];
+  const told = JSON.stringify([night.matches, data.heading, entries.map(([label, part]) => [label, part.outerHTML])]);
+  if (byId("key").dataset.told === told) return; // nothing on the page moves while the same things are shown
+  byId("key").dataset.told = told;
+  byId("key").replaceChildren(...(data.heading ? [make("em", data.heading)] : []), ...entries.map(([label, part]) => {
+    const entry = make("span", ""), picture = drawing("svg", { width: 34, height: 14, "aria-hidden": true });
+    picture.append(part);
+    entry.append(picture, label);
+    return entry;
+  }));
 }
 function ring() {
   const plot = byId("diagram"), place = data.states[shown].values, last = plot.data.length - 1;
@@ -89,20 +128,23 @@ const colorscale = () => {
   const n = data.zones.length;
   return data.zones.flatMap((zone, k) => [[k / n, zone.color], [(k + 1) / n, zone.color]]);
 };
+// so many that short waves are round, and so high that they are waves and no needles
+const sectorsOf = (mode) => Math.min(Math.max(SECTORS, PER_WAVE * (mode ? mode.n : 0)), MOST_SECTORS);
+const amplitude = (mode) => Math.min(AMPLITUDE * extent(), mode && mode.n ? (OF_A_WAVE * 2 * Math.PI * data.box[0]) / mode.n : Infinity);
 function turned(rho, eta, mode, part) {
-  const x = [], y = [], z = [], size = part * AMPLITUDE * extent();
-  for (let i = 0; i < rho.length; i++) for (let j = 0; j < SECTORS; j++) {
-    const angle = (2 * Math.PI * j) / SECTORS, [c, s] = [Math.cos(angle), Math.sin(angle)];
+  const x = [], y = [], z = [], size = part * amplitude(mode), sectors = sectorsOf(mode);
+  for (let i = 0; i < rho.length; i++) for (let j = 0; j < sectors; j++) {
+    const angle = (2 * Math.PI * j) / sectors, [c, s] = [Math.cos(angle), Math.sin(angle)];
     const wave = mode ? Math.cos(mode.n * angle) : 0, radial = rho[i] + (mode ? size * mode.u[i] * wave : 0);
     const around = mode && mode.c ? size * mode.c[i] * Math.sin(mode.n * angle) : 0;
     x.push(radial * c - around * s); y.push(radial * s + around * c); z.push(eta[i] + (mode ? size * mode.w[i] * wave : 0));
   }
   return { x, y, z };
 }
-function triangles(count) {
+function triangles(count, sectors) {
   const i = [], j = [], k = [];
-  for (let a = 0; a < count - 1; a++) for (let b = 0; b < SECTORS; b++) {
-    const c = (b + 1) % SECTORS, [p, q, r, s] = [a * SECTORS + b, a * SECTORS + c, (a + 1) * SECTORS + c, (a + 1) * SECTORS + b];
+  for (let a = 0; a < count - 1; a++) for (let b = 0; b < sectors; b++) {
+    const c = (b + 1) % sectors, [p, q, r, s] = [a * sectors + b, a * sectors + c, (a + 1) * sectors + c, (a + 1) * sectors + b];
     i.push(p, p); j.push(q, r); k.push(r, s);
   }
   return { i, j, k };
@@ -124,7 +166,7 @@ function bodies() {
     const parts = body.rho.length === 1 && body.rho[0] === 0
       ? [{ type: "scatter3d", mode: "markers", x: [0], y: [0], z: body.z, marker: { color: "#b03060", size: 7 }, hoverinfo: "text", hovertext: body.label, showlegend: false }]
       : body.rho.length > 1 && body.rho.some((r) => r > 0)
-        ? [{ type: "mesh3d", ...turned(body.rho, body.z, null, 0), ...triangles(body.rho.length), color: body.rigid ? "#8a8f94" : "#b03060",
+        ? [{ type: "mesh3d", ...turned(body.rho, body.z, null, 0), ...triangles(body.rho.length, SECTORS), color: body.rigid ? "#8a8f94" : "#b03060",
           opacity: 0.45, hoverinfo: "text", hovertext: body.label, showscale: false }]
         : body.rho[0] > 0 ? [circle(body.rho[0], body.z[0], red)]
         : [{ type: "scatter3d", mode: "lines", x: body.rho.map(() => 0), y: body.rho.map(() => 0), z: body.z, hoverinfo: "text", hovertext: body.label, showlegend: false, ...red }];
@@ -140,11 +182,11 @@ async function space() {
   if (ask !== wanted) return;
   drawn = shape;
   const name = byId("color").value, mode = chosenMode(shape), edges = [0, shape.rho.length - 1].filter((e) => shape.rho[e] > 1e-6 * data.box[0]);
-  const cells = triangles(shape.rho.length), [low, high] = name === ZONED ? [-0.5, data.zones.length - 0.5] : range(name);
+  const sectors = sectorsOf(mode), cells = triangles(shape.rho.length, sectors), [low, high] = name === ZONED ? [-0.5, data.zones.length - 0.5] : range(name);
   const label = (data.fields.find((f) => f.name === name) || { label: data.zoned }).label;
   const colors = name === ZONED
-    ? { intensitymode: "cell", intensity: shape.zone.flatMap((kind) => Array(2 * SECTORS).fill(kind)), colorscale: colorscale() }
-    : { intensitymode: "vertex", intensity: shape.fields[name].flatMap((v) => Array(SECTORS).fill(v)), colorscale: "Viridis" };
+    ? { intensitymode: "cell", intensity: shape.zone.flatMap((kind) => Array(2 * sectors).fill(kind)), colorscale: colorscale() }
+    : { intensitymode: "vertex", intensity: shape.fields[name].flatMap((v) => Array(sectors).fill(v)), colorscale: "Viridis" };
   const ticks = name === ZONED ? { tickvals: data.zones.map((_, n) => n), ticktext: data.zones.map((zone) => zone.label.replace(" wrinkles", "")) } : {};
   const flat = byId("space").clientWidth < 420 ? { orientation: "h", y: -0.02, len: 0.9 } : {};
   const mesh = { type: "mesh3d", ...turned(shape.rho, shape.eta, mode, mode ? phase : 0), ...cells, ...colors, cmin: low, cmax: high,
@@ -170,8 +212,9 @@ function modes(shape) {
   fill(byId("mode"), [["none", "at rest"], ...shape.modes.map((mode, k) => [String(k), mode.label])], shape.modes[Number(kept)] ? kept : "none");
 }
 function meridian(shape) {
-  const mode = chosenMode(shape), size = AMPLITUDE * extent() * phase, rho = shape.rho, eta = shape.eta;
-  const line = (r, z, look) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false, x: r, y: z, ...look });
+  const mode = chosenMode(shape), size = amplitude(mode) * phase, rho = shape.rho, eta = shape.eta;
+  const line = (r, z, look) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false, x: r, y: z, ...look,
+    line: { ...look.line, simplify: false } }); // Plotly leaves out points of thick lines, and what is round gets corners
   const traces = [], seen = new Set();
   for (let a = 0, b; a < shape.zone.length; a = b) {
     for (b = a + 1; b < shape.zone.length && shape.zone[b] === shape.zone[a]; b++);

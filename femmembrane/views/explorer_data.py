@@ -29,7 +29,7 @@ from ..results.table import columns
 from ..results.zones import KINDS
 from ..scene import ALL
 from .backend import load
-from .branch_lines import MARKERS, Strands, answer
+from .branch_lines import MARKERS, Strands, after, answer
 from .figures import AMONG, Style
 from .picture import zone_colors
 from .surroundings import Box, named, surroundings
@@ -182,7 +182,9 @@ def _state(state: State, place: Array, names: Sequence[str], units: Units) -> di
         "step": state.step,
         "name": f"step {state.step}" if point is None else _point_name(point),
         "kind": None if point is None else str(point.kind),
-        "values": [_rounded(v, _NUMBER) for v in place],
+        "word": "" if point is None else _kind_name(point),
+        "after": "" if point is None else after(point),
+        "values": _array(place, _NUMBER),
         "verdicts": [_verdict(equilibrium.verdict(p.control, azimuthal=p.azimuthal), p.words) for p in wanted],
         "answers": [*_point_words(point), *_answers(equilibrium)],
         "numbers": [[heading_in(name, units), _rounded(units.factor(name) * getattr(equilibrium, name), _NUMBER)] for name in PLACES],
@@ -190,12 +192,21 @@ def _state(state: State, place: Array, names: Sequence[str], units: Units) -> di
 
 
 def _point_name(point: SpecialPoint) -> str:
-    name = MARKERS.get(str(point.kind), ("X", str(point.kind).replace("_", " ")))[1]
+    name = _kind_name(point)
     return f"{name}, n = {point.azimuthal}" if point.azimuthal else name
 
 
+def _kind_name(point: SpecialPoint) -> str:
+    """The kind of a special point, and of an onset what comes after it."""
+    name = MARKERS.get(str(point.kind), ("X", str(point.kind).replace("_", " ")))[1]
+    return f"{name}, {after(point)}" if after(point) else name
+
+
 def _point_words(point: SpecialPoint | None) -> list[list[str]]:
-    return [] if point is None else [["located", f"to a relative error of {point.error:.1e}"]]
+    if point is None:
+        return []
+    beyond = [["beyond it", point.postbuckling.words]] if point.azimuthal else []
+    return [["located", f"to a relative error of {point.error:.1e}"], *beyond]
 
 
 def _verdict(verdict: Verdict, against: str) -> dict[str, Any]:
@@ -266,7 +277,7 @@ def _some(states: Sequence[State], most: int = 7) -> list[Equilibrium]:
 
 def _room(shown: Sequence[Equilibrium], units: Units) -> dict[str, Any]:
     """The sources near the membranes, and the box around all."""
-    box = Box.of([equilibrium.profile() for equilibrium in shown])
+    box = Box.of([_meridian(equilibrium) for equilibrium in shown])
     around, length = surroundings(shown[0].scene, box), units.factor("rho")
     bodies = [
         {
@@ -285,6 +296,14 @@ def _room(shown: Sequence[Equilibrium], units: Units) -> dict[str, Any]:
     }
 
 
+def _meridian(equilibrium: Equilibrium) -> dict[str, Array]:
+    """Where the nodes are, without the stretches and stresses of a profile."""
+    space = equilibrium.potential.space
+    s = space.node_parameters()
+    (u, _, w, _), (R, Z) = space.displacement(equilibrium.state, s), space.mesh.position(s)
+    return {"rho": R + u, "eta": Z + w}
+
+
 # --- numbers
 
 
@@ -294,9 +313,26 @@ def _rounded(value: Any, digits: int) -> float | None:
     return float(f"{number:.{digits}g}") + 0.0 if np.isfinite(number) else None
 
 
-def _array(values: NDArray[Any], digits: int = _SHAPE) -> list[float | None]:
-    return [_rounded(value, digits) for value in values]
+#: powers of ten as they are written, from the first on
+_FIRST = -300
+_TENS = np.array([float(f"1e{k}") for k in range(_FIRST, 301)])
+
+
+def _array(values: NDArray[Any], digits: int = _SHAPE) -> list[Any]:
+    """Numbers as :func:`_rounded` has them, in lists within lists; all at once, for a page has tens of thousands."""
+    v = np.asarray(values, dtype=float)
+    finite = np.isfinite(v)
+    size = np.abs(np.where(finite & (v != 0), v, 1.0))
+    last = np.clip(digits - 1 - np.floor(np.log10(size)).astype(int), _FIRST, -_FIRST)  # the place that is rounded
+    up, down = _TENS[np.maximum(last, 0) - _FIRST], _TENS[np.maximum(-last, 0) - _FIRST]
+    with np.errstate(over="ignore"):
+        rounded = np.rint(np.where(finite, v, 0.0) / down * up) / up * down + 0.0
+    if finite.all():
+        return rounded.tolist()
+    found = rounded.astype(object)
+    found[~finite] = None
+    return found.tolist()
 
 
 def _columns(line: Array) -> list[list[float | None]]:
-    return [_array(column, 6) for column in line.T]
+    return _array(line.T, 6)

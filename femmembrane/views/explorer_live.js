@@ -26,12 +26,8 @@ async function ask() {
       fresh.live = data.live;
       data = fresh;
       now = shown = Math.round(share * (data.states.length - 1));
-      choices();
-      diagram();
-      points();
-      state();
+      if (!sketch()) diagram();
       cost(fresh);
-      window.explorer.version = fresh.version;
       await new Promise(requestAnimationFrame);
     } catch (error) {
       byId("status").replaceChildren(make("b", "no branch", "bad"), make("span", ` ${error.message}`));
@@ -39,7 +35,43 @@ async function ask() {
   }
   live.busy = false;
   clearTimeout(live.idle);
-  live.idle = setTimeout(() => show(now), REST); // shapes are drawn when the hand rests
+  live.idle = setTimeout(rest, REST);
+}
+// While a hand moves, the curve alone is drawn, on the axes that are there: a tenth of the work of a diagram. Where it leaves them, or
+// would be small on them, the diagram is drawn with axes that fit.
+const FILLED = 0.4;
+function fits(axis, c) {
+  const [a, b] = axis.range, every = data.lines.flatMap((line) => line.values[c]).filter((v) => v !== null);
+  const low = every.reduce((u, v) => Math.min(u, v), Infinity), high = every.reduce((u, v) => Math.max(u, v), -Infinity);
+  return !axis.autorange || (low >= a && high <= b && high - low > FILLED * (b - a));
+}
+function sketch() {
+  const of = byId("diagram")._fullLayout, [x, y] = ["across", "up"].map((id) => column(byId(id).value));
+  if (!of || x < 0 || y < 0 || !fits(of.xaxis, x) || !fits(of.yaxis, y)) return false;
+  const at = (values, k) => `${of.xaxis.l2p(values[x][k]).toFixed(1)} ${of.yaxis.l2p(values[y][k]).toFixed(1)}`;
+  const path = (line, color, width) => drawing("path", { d: "M" + line.values[x].map((v, k) => (v === null || line.values[y][k] === null ? null
+    : at(line.values, k))).filter(Boolean).join("L"), fill: "none", stroke: color, "stroke-width": width, "stroke-dasharray": line.dash && line.dash !== "solid" ? line.dash : "none" });
+  const marks = data.states.filter((s) => s.kind).map((s) => {
+    const mark = polygon(markerOf(s));
+    mark.setAttribute("transform", `translate(${of.xaxis.l2p(s.values[x])} ${of.yaxis.l2p(s.values[y])})`);
+    return mark;
+  });
+  const picture = byId("sketch");
+  Object.assign(picture.style, { left: `${of.xaxis._offset}px`, top: `${of.yaxis._offset}px`, width: `${of.xaxis._length}px`, height: `${of.yaxis._length}px` });
+  picture.replaceChildren(
+    ...compared.flatMap((c) => c.lines.map((line) => path(line, c.color, line.width))),
+    ...data.bands.map((band) => path(band, ink(band), 10)), ...data.lines.map((line) => path(line, ink(line), line.width)),
+    ...data.snaps.map((snap) => path({ values: snap }, SNAP, 2)), ...marks);
+  picture.parentElement.classList.add("sketched");
+  return true;
+}
+// all is shown when the hand rests
+async function rest() {
+  choices();
+  diagram();
+  points();
+  live.settled = data.version;
+  await show(now);
 }
 function slider(of) {
   const row = make("label"), range = make("input"), exact = make("input");

@@ -7,7 +7,9 @@ the figures read the same in grey.
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -20,6 +22,7 @@ from ..files import replace_file
 from .backend import drawing, load, title_text
 from .journal import fit, layout
 from .labels import covered, settle
+from .tex import tex_texts
 from .zones import zone_order
 
 if TYPE_CHECKING:
@@ -195,7 +198,7 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
 
     The suffix must be a format that Matplotlib writes.
 
-    Text in SVG and PDF files stays text, which programs for drawing can edit.
+    Text in SVG and PDF files stays text, which programs for drawing can edit. In PGF files it is set by the document that reads them.
     """
     fit(figure)
     settle(figure)
@@ -207,14 +210,35 @@ def save_figure(figure: Figure, path: str | PathLike[str] | None) -> Figure:
             )
         from matplotlib import rc_context, rcParams
 
-        with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT):
+        for_tex = Path(path).suffix.lower() == ".pgf"
+        with replace_file(path) as temporary, drawing(), rc_context(_LIVE_TEXT), tex_texts(figure) if for_tex else nullcontext():
             try:
                 figure.savefig(temporary, dpi=_DPI if rcParams["savefig.dpi"] == "figure" else rcParams["savefig.dpi"])
             except (RuntimeError, FileNotFoundError) as error:
-                if Path(path).suffix.lower() != ".pgf":
+                if not for_tex:
                     raise
-                raise InputError("path", str(path), "LaTeX is needed for PGF (xelatex on the search path)") from error
+                program = rcParams["pgf.texsystem"]
+                raise InputError("path", str(path), f"LaTeX is needed for PGF ({program} on the search path)") from error
+            except ValueError as error:
+                said = re.search(r"^! (.*)", str(error), re.MULTILINE)
+                if not for_tex or said is None:
+                    raise
+                raise InputError("path", str(path), f"PGF is written with the help of LaTeX, which says: {said[1]}") from error
     return figure
+
+
+#: colours of several curves or branches in one picture: for the colour-blind too, and of different lightness
+COLORS = ("#0072b2", "#d55e00", "#222222", "#56b4e9", "#a01040", "#e69f00", "#009e73")
+#: dashes that go with them, so many that no two curves of 28 look the same
+DASHES: tuple[Any, ...] = ("solid", (0, (6, 2)), (0, (2, 1.2)), (0, (7, 1.5, 1.5, 1.5)))
+
+
+def tell_apart(axes: Axes) -> None:
+    """Let the curves that are drawn next differ in colour, in lightness and in dashes, so that they do in grey as well."""
+    from cycler import cycler
+
+    looks = [(COLORS[k % len(COLORS)], DASHES[k % len(DASHES)]) for k in range(len(COLORS) * len(DASHES))]
+    axes.set_prop_cycle(cycler(color=[color for color, _ in looks], linestyle=[dashes for _, dashes in looks]))
 
 
 def save_axes(axes: Axes, path: str | PathLike[str] | None) -> Axes:
@@ -249,6 +273,10 @@ def draw_legend(axes: Axes, heading: str | None = None, **look: Any) -> None:
     legend = draw()
     if figure is None or not hasattr(figure, _HEIGHTS) or "loc" in look or not covers(legend, axes):
         return  # in figures of others there may be no room below
+    for corner in _CORNERS:  # Matplotlib's own choice looks at corners of lines, and not as far from them
+        legend.set_loc(corner)
+        if not _over(legend, axes):
+            return
     legend.remove()
     low = axes.get_window_extent().y0 - axes.xaxis.get_tightbbox().y0  # type: ignore[union-attr]  # the axes are shown
     place = axes.transAxes + ScaledTranslation(0.0, -low / figure.dpi - 0.05, figure.dpi_scale_trans)
@@ -260,10 +288,18 @@ def covers(legend: Any, axes: Axes) -> bool:
     """Whether a legend lies over a line, a marker or words in its axes."""
     figure = legend.get_figure(root=True)
     figure.draw_without_rendering()
+    return _over(legend, axes)
+
+
+def _over(legend: Any, axes: Axes) -> bool:
+    """The same, in a figure that is laid out."""
+    figure = legend.get_figure(root=True)
     box = legend.get_window_extent().padded(_CLEAR * figure.dpi / 72)
     return covered(axes, box) > 0 or any(box.overlaps(text.get_window_extent()) for text in axes.texts if text.get_text())
 
 
+#: where a legend may stand in its axes
+_CORNERS = ("upper right", "upper left", "lower right", "lower left", "center right", "center left")
 #: height in inches that a figure of this package had before a legend stood below its axes, and the heights of these legends
 _HEIGHTS = "_femmembrane_heights"
 

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..quantities import Units, axis_label, key_label
+from ..quantities import PLACES, Units, axis_label, key_label
 from ..results.grid import DIMENSIONS, place_of_variable
+from ..results.identities import FAMILIES, NOT_SURE, with_identities
 from .backend import title_text
-from .figures import fitting_columns, new_figure, save_axes, save_figure
+from .figures import BLUE, DASHED, DOTTED, ORANGE, SOLID, fitting_columns, new_figure, save_axes, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,12 +30,24 @@ Array = NDArray[Any]
 
 #: variables shown for each quantity by default, as far as the sweep has them
 SHOWN = {
-    "branch": ("limit_points", "limit_pressure.0", "limit_pressure.1", "largest_wrinkled_fraction"),
-    "run": ("steps", "limit_points", "limit_pressure.0", "largest_wrinkled_fraction"),
+    "branch": ("limit_points", "limit_pressure#1", "limit_pressure#2", "largest_wrinkled_fraction"),
+    "run": ("steps", "limit_points", "limit_pressure#1", "largest_wrinkled_fraction"),
     "equilibria": ("equilibria", "stable_equilibria"),
     "tipping": ("onset_center_height", "onset_pressure"),
     "wrinkling": ("onset_center_height", "onset_pressure"),
 }
+#: in place of those that are numbered, over one key: all of them in one panel
+_ALL = {"limit_pressure#1": "limit_pressure", "limit_pressure#2": ""}
+#: colours of numbered points, with dashes that tell them apart in grey
+_LINES = (
+    (BLUE, SOLID),
+    (ORANGE, DASHED),
+    ("#009e73", DOTTED),
+    ("#cc79a7", (0, (6, 1.5, 1, 1.5))),
+    ("#56b4e9", (0, (8, 2))),
+)
+_UNSURE = "not followed from a neighbour"
+_OTHERWISE = "it has another number beside"
 _HATCHES = ("////", "\\\\\\\\", "xxxx", "....", "----", "||||", "++++", "oooo")
 _MARKERS = "osv^D<>p"
 #: values that count something, in as many shades
@@ -62,9 +75,9 @@ def plot_grid(
     if len(dims) > 2:
         allowed = "maps have two keys, curves one; choose values of the others by to_xarray().sel(...) for a plot of your own"
         raise InputError("over", list(dims), allowed)
-    data = sweep.to_xarray()
-    names = list(_available(data, SHOWN[sweep.quantity]) if show is None else show)
-    panels = [(name, _factor(name, chosen) * _values(data, name, dims)) for name in names]
+    data = with_identities(sweep.to_xarray(), dims)  # of a file that lacks them
+    names = list(_available(data, _shown(sweep.quantity, len(dims))) if show is None else show)
+    panels = [(name, _factor(name, chosen), _values(data, name, dims)) for name in names]
     if not panels:
         raise InputError("sweep", sweep.quantity, "no scene has a result to show; status and message say why")
     draw = _draw_map if len(dims) == 2 else _draw_curve
@@ -72,8 +85,8 @@ def plot_grid(
     hatches: dict[str, str] = {}
     if ax is None:
         figure, row = new_figure((5.2 * len(panels) + 0.4, 4.9), widths=[1.0] * len(panels))
-    for axes, (name, values) in zip(np.atleast_1d(row) if ax is None else [ax], panels, strict=ax is None):
-        handles |= draw(axes, data, dims, name, _label(name, chosen), values, hatches)
+    for axes, (name, factor, values) in zip(np.atleast_1d(row) if ax is None else [ax], panels, strict=ax is None):
+        handles |= draw(axes, data, dims, name, _label(name, chosen), factor * values, hatches, factor)
     if ax is not None:
         if handles:
             ax.legend(list(handles.values()), list(handles), framealpha=0.9, edgecolor="none", fontsize=8.5)
@@ -91,43 +104,98 @@ def plot_grid(
     return save_figure(figure, path)
 
 
+def _shown(quantity: str, keys: int) -> list[str]:
+    names = SHOWN[quantity]
+    return list(names) if keys > 1 else [shown for name in names if (shown := _ALL.get(name, name))]
+
+
 def _available(data: Any, names: Sequence[str]) -> Iterator[str]:
     for name in names:
-        variable, _, place = name.partition(".")
-        if variable in data and (not place or int(place) < data[variable].shape[-1]):
-            yield name
+        variable, mark, place = _parts(name)
+        if variable not in data:
+            continue
+        if mark == "#" and int(place) > _count(data, variable):
+            continue
+        if not mark and f"{_tag(variable)}identity" in data and not _count(data, variable):
+            continue
+        yield name
+
+
+def _parts(name: str) -> tuple[str, str, str]:
+    """A variable, whether points are named by number (#) or by place (.), and which."""
+    mark = "#" if "#" in name else "."
+    variable, found, place = str(name).partition(mark)
+    return variable, found, place
+
+
+def _tag(variable: str) -> str:
+    """The family of the points whose places a variable holds; empty for others."""
+    return next((tag for tag in FAMILIES if variable.removeprefix(tag) in PLACES and variable.startswith(tag)), "")
+
+
+def _numbered(data: Any, variable: str) -> bool:
+    """Whether a variable holds places of points that have numbers."""
+    return bool(_tag(variable)) and f"{_tag(variable)}identity" in data
+
+
+def _count(data: Any, variable: str) -> int:
+    """How many numbers the points of a variable have."""
+    if not _numbered(data, variable):
+        return 0
+    known = data[f"{_tag(variable)}identity"].values
+    return int(np.nanmax(known)) if np.isfinite(known).any() else 0
+
+
+def _of_number(data: Any, variable: str, number: int) -> Array:
+    """The values of the point with a number, shape of the grid; NaN where there is none."""
+    own = data[f"{_tag(variable)}identity"].values == number
+    values = np.where(own, data[variable].values, 0.0).sum(axis=-1)
+    return np.where(own.any(axis=-1), values, np.nan)
 
 
 def _values(data: Any, name: str, dims: tuple[str, ...]) -> Array:
-    """The numbers of a panel, shape of the grid."""
+    """The numbers of a panel, shape of the grid; with one more axis for the numbers of points, where a curve shows all of them."""
     known = [str(v) for v in data.data_vars if data[v].dtype.kind == "f" and v in DIMENSIONS]
-    variable, _, place = str(name).partition(".")
+    variable, mark, place = _parts(name)
     if variable not in known:
         raise unknown_name("show", name, known)
     array = data[variable]
+    if mark == "#":
+        count = _count(data, variable)
+        if not place.isdigit() or not 1 <= int(place) <= count:
+            numbers = f"its points have numbers 1 to {count}" if count else "its values have no numbers"
+            raise InputError("show", name, f"{variable} with a number such as {variable}#1 is allowed: {numbers}")
+        return _of_number(data, variable, int(place))
+    if array.ndim > len(dims) == 1 and not mark and _numbered(data, variable):
+        return np.stack([_of_number(data, variable, k + 1) for k in range(_count(data, variable))], axis=-1)
     if array.ndim == len(dims):
         if place:
             raise InputError("show", name, f"{variable} has one value a scene: give no place")
         return array.values
     if not place.isdigit() or int(place) >= array.shape[-1]:
-        raise InputError(
-            "show", name, f"{variable} with a place from 0 is allowed, such as {variable}.0: scenes have up to {array.shape[-1]}"
-        )
+        allowed = f"{variable} with a place from 0 is allowed, such as {variable}.0: scenes have up to {array.shape[-1]}"
+        if _numbered(data, variable):
+            allowed += f"; or a point by its number, such as {variable}#1"
+        raise InputError("show", name, allowed)
     return array.values[..., int(place)]
 
 
 def _factor(name: str, units: Units) -> float:
-    return units.factor(place_of_variable(name.partition(".")[0])[0])
+    return units.factor(place_of_variable(_parts(name)[0])[0])
 
 
 def _label(name: str, units: Units) -> str:
     """What a panel shows, with its unit."""
-    variable, _, place = name.partition(".")
+    variable, mark, place = _parts(name)
     quantity, what = place_of_variable(variable)
-    return f"{what}{f' {int(place) + 1}' if place else ''}: {axis_label(quantity, units)}" if quantity else axis_label(variable)
+    if not quantity:
+        return axis_label(variable)
+    which = f" #{place}" if mark == "#" else f" {int(place) + 1}" if place else "s" if _tag(variable) else ""
+    order = " of each branch" if mark == "." and _tag(variable) else ""
+    return f"{what}{which}{order}: {axis_label(quantity, units)}"
 
 
-def _reasons(data: Any, values: Array) -> Array:
+def _reasons(data: Any, values: Array, name: str = "") -> Array:
     """Why a scene has no plain value: how its branch ended, or that nothing of the kind was found. Empty for plain values."""
     status = np.asarray(data["status"].values, dtype=object)
     outcome = np.asarray(data["outcome"].values, dtype=object) if "outcome" in data else np.full(status.shape, "none there", dtype=object)
@@ -137,9 +205,18 @@ def _reasons(data: Any, values: Array) -> Array:
     ended = np.array([f"{s}, before there was one" for s in status.ravel()], dtype=object).reshape(status.shape)
     ended = np.where(np.asarray(data["has_result"].values), ended, status)
     reasons[missing] = np.where(status == good, outcome, ended)[missing]
+    variable, mark, _ = _parts(name)
+    if mark == "#":
+        for what, reason in ((data[f"{_tag(variable)}cut"].values == 1, _OTHERWISE), (_unsure(data, variable), _UNSURE)):
+            reasons[missing & what.any(axis=-1)] = reason
     early = ~missing & (status != good)
     reasons[early] = np.array([f"{s}, further on" for s in status[early]], dtype=object)
     return reasons
+
+
+def _unsure(data: Any, variable: str) -> Array:
+    """Which points of each scene have no number."""
+    return np.asarray(data[f"{_tag(variable)}identity"].values == NOT_SURE)
 
 
 def _positions(data: Any, key: str) -> tuple[Array, bool]:
@@ -158,13 +235,13 @@ def _edges(centers: Array) -> Array:
 
 
 def _draw_map(
-    axes: Axes, data: Any, dims: tuple[str, ...], name: str, label: str, values: Array, hatches: dict[str, str]
+    axes: Axes, data: Any, dims: tuple[str, ...], name: str, label: str, values: Array, hatches: dict[str, str], factor: float
 ) -> dict[str, Any]:
     x, y = (_positions(data, key)[0] for key in dims)
     along, up = np.argsort(x), np.argsort(y)
     x_edges, y_edges = _edges(x[along]), _edges(y[up])
     grid = values[np.ix_(along, up)].T
-    reasons = _reasons(data, values)[np.ix_(along, up)].T
+    reasons = _reasons(data, values, name)[np.ix_(along, up)].T
     axes.set_facecolor("white")
     if np.isfinite(grid).any():
         _shade(axes, name, x_edges, y_edges, grid, grid[np.isfinite(grid) & (reasons == "")])
@@ -219,20 +296,25 @@ def _hatch(axes: Axes, x_edges: Array, y_edges: Array, reasons: Array, grid: Arr
 
 
 def _draw_curve(
-    axes: Axes, data: Any, dims: tuple[str, ...], name: str, label: str, values: Array, hatches: dict[str, str]
+    axes: Axes, data: Any, dims: tuple[str, ...], name: str, label: str, values: Array, hatches: dict[str, str], factor: float
 ) -> dict[str, Any]:
     """A curve over one key; scenes without a plain value are marked at the foot, or on the curve."""
     (key,) = dims
     x, numbers = _positions(data, key)
     order = np.argsort(x)
-    x, values, reasons = x[order], values[order], _reasons(data, values)[order]
-    axes.plot(x, values, "-", color="#0072b2", linewidth=1.6, marker=".", markersize=5)
+    handles: dict[str, Any] = {}
+    if values.ndim > 1:
+        handles = _draw_numbered(axes, data, name, x, order, values, factor)
+        with np.errstate(all="ignore"):
+            values = np.where(np.isfinite(values).any(axis=-1), np.nanmin(np.where(np.isfinite(values), values, np.inf), axis=-1), np.nan)
+    x, values, reasons = x[order], values[order], _reasons(data, values, name)[order]
+    if not handles:
+        axes.plot(x, values, "-", color=BLUE, linewidth=1.6, marker=".", markersize=5)
     axes.set(xlabel=key_label(key), ylabel=label)
     axes.grid(color="0.92", linewidth=0.6)
     if not numbers:
         axes.set_xticks(x, [title_text(str(v)) for v in data[key].values[order]], parse_math=False)
     foot = np.nanmin(values) if np.isfinite(values).any() else 0.0
-    handles = {}
     for reason in sorted(set(reasons) - {""}):
         hatches.setdefault(reason, _MARKERS[len(hatches) % len(_MARKERS)])
         own = reasons == reason
@@ -240,4 +322,26 @@ def _draw_curve(
         (handles[reason],) = axes.plot(
             x[own], places, linestyle="none", marker=hatches[reason], color="#222222", markerfacecolor="white", markersize=6
         )
+    return handles
+
+
+def _draw_numbered(axes: Axes, data: Any, name: str, x: Array, order: Array, values: Array, factor: float) -> dict[str, Any]:
+    """A line for each numbered point, which ends where the point does; points without a number are hollow and joined by nothing."""
+    what = place_of_variable(name)[1]
+    handles: dict[str, Any] = {}
+    for k, curve in enumerate(values[order].T):
+        if k < len(_LINES):
+            color, dashes = _LINES[k]
+            (handles[f"{what} #{k + 1}"],) = axes.plot(
+                x[order], curve, linestyle=dashes, color=color, linewidth=1.6, marker=".", markersize=5
+            )
+        else:
+            (handles[f"{what}s with higher numbers"],) = axes.plot(
+                x[order], curve, ":", color="0.6", linewidth=1.2, marker=".", markersize=4
+            )
+    rows, places = np.nonzero(_unsure(data, name))
+    if rows.size:
+        unsure = factor * data[name].values[rows, places]
+        look: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "0.45", "markerfacecolor": "white", "markersize": 5}
+        (handles[_UNSURE],) = axes.plot(x[rows], unsure, **look)
     return handles

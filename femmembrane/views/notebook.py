@@ -8,13 +8,12 @@ from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..quantities import PLACES, title, words
+from ..quantities import PLACES, axis_label, title, words
 from ..results.branch import Branch
 from ..results.folds import FOLD_NAMES
 from . import plots
-from .branch_lines import COLORS
 from .explorer import framed
-from .figures import png
+from .figures import COLORS, png
 from .html import branch_rows, equilibrium_pairs, table
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from ..results.equilibrium import Equilibrium
     from ..results.error_estimate import ErrorEstimate
     from ..results.folds import FoldCurve
+    from ..results.tipped import TippedBranch
     from ..results.zones import Zones
 
 _ROWS = 12
@@ -46,6 +46,27 @@ def _still(branch: Branch) -> str:
     notes = "".join(f"<p>{escape(note)}</p>" for note in (branch.mesh_used, branch.message) if note)
     picture = _picture(plots.plot_pressure_volume(branch), "Pressure against volume")
     return f'{picture}<div style="overflow-x:auto">{table(header, rows, caption=count)}</div>{notes}'
+
+
+def tipped_html(branch: TippedBranch) -> str:
+    """The diagram of a branch with waves, a table of at most twelve equilibria, its folds, and how it ended."""
+    if not len(branch):
+        return f"<p>No equilibria: {escape(branch.message or str(branch.status))}</p>"
+    controls = [f"verdict_{control}" for control in ("volume", "pressure") if control in branch.scene.analysis.stability]
+    names = [*PLACES, "amplitude", "shift", "truncation", *controls]
+    shown = sorted({round(k * (len(branch) - 1) / (_ROWS - 1)) for k in range(_ROWS)}) if len(branch) > _ROWS else list(range(len(branch)))
+    columns = {name: branch.column(name) for name in names if not name.startswith("verdict_")}
+    verdicts = {name: [branch[k].verdict(name.removeprefix("verdict_")).word for k in shown] for name in controls}
+    rows = [[k, *(float(columns[n][k]) if n in columns else verdicts[n][row] for n in names)] for row, k in enumerate(shown)]
+    count = f"{len(branch)} equilibria with waves around the axis" + (f", {len(rows)} of them shown" if len(rows) < len(branch) else "")
+    known = table(["step", *(title(name) for name in names)], rows, caption=count)
+    folds = [[p.kind.replace("_", " "), p.volume, p.pressure, p.center_height] for p in branch.special_points or ()]
+    points = table(["", *map(title, PLACES)], folds) if folds else ""
+    figure, axes = plots.new_figure((6.4, 4.6), title=branch.scene.title)
+    branch.plot(ax=axes)
+    axes.set(xlabel=axis_label("volume"), ylabel=axis_label("pressure"))
+    message = f"<p>{escape(branch.message)}</p>" if branch.message else ""
+    return f'{_picture(figure, "Pressure against volume")}<div style="overflow-x:auto">{known}</div>{points}{message}'
 
 
 def equilibrium_html(equilibrium: Equilibrium) -> str:

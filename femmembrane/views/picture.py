@@ -20,7 +20,7 @@ from ..files import replace_file
 from ..quantities import in_si, quantity
 from ..results.zones import KINDS
 from .backend import load
-from .surroundings import Box, surroundings
+from .surroundings import Box, Surroundings, surroundings
 from .vtk import FIELDS, SECTORS, Revolution, smooth_profile
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ _MATT: dict[str, Any] = {"ambient": 0.35, "diffuse": 0.65, "specular": 0.1}
 #: the number of each kind of zones, in the middle of its colour, and its name beside it
 _ZONE_LIMITS = (-0.5, len(KINDS) - 0.5)
 _ZONE_NAMES = ("taut", "radial", "circum-\nferential", "both\nways")
+#: directions in which the outline of a body reaches farthest
+_ROUND = ((1, 0), (-1, 0), (0, 1), (0, -1))
 #: nothing is rendered before all is there
 _STILL: dict[str, Any] = {"reset_camera": False, "render": False}
 #: height in pixels of a picture whose text has its plain size
@@ -131,6 +133,16 @@ class Surface:
     def points(self) -> Array:
         """Positions, shape (n_points, 3)."""
         return self.revolution.vectors(self.rho, self.eta)
+
+    @property
+    def scalars(self) -> Array:
+        """Values at the points."""
+        return self.revolution.scalars(self.values)
+
+    @property
+    def circles(self) -> list[tuple[int, float]]:
+        """Nodes whose circles are drawn, with their thickness."""
+        return circles(self.rho, self.eta, [end % self.rho.size for end in self.equilibrium.potential.space.edges])
 
     @property
     def normals(self) -> Array:
@@ -247,7 +259,7 @@ class DrawnMembrane:
             first = np.concatenate([revolution.node[cells].min(axis=1) for cells in (revolution.triangles, revolution.quads)])
             self._mesh.cell_data["zone"] = surface.values[first]
         else:
-            self._mesh.point_data[surface.quantity] = revolution.scalars(surface.values)
+            self._mesh.point_data[surface.quantity] = surface.scalars
 
     def _scale(self, surface: Surface) -> dict[str, Any]:
         if surface.quantity == "zone":
@@ -257,8 +269,7 @@ class DrawnMembrane:
     def _draw_circles(self, surface: Surface) -> None:
         import pyvista
 
-        ends = [end % surface.rho.size for end in surface.equilibrium.potential.space.edges]
-        shown = circles(surface.rho, surface.eta, ends)
+        shown = surface.circles
         points = _rings(np.array([(surface.rho[node], surface.eta[node], radius * self._size) for node, radius in shown]).reshape(-1, 3))
         if self._lines is not None and self._lines.n_points == len(points):
             self._lines.points = points
@@ -358,16 +369,53 @@ def zone_colors() -> tuple[str, ...]:
 def draw_surroundings(plotter: pyvista.Plotter, scene: Scene, box: Box) -> list[Array]:
     """The bodies of sources with arrows along their moments, and a line of text for each that is not drawn; the points of the bodies."""
     around, drawn = surroundings(scene, box), []
-    for body in around.near:
-        for part in _parts(body, 0.1 * box.size):
-            look = {"color": "0.6", "opacity": 0.25} if body.rigid else {"color": _SOURCE}
-            plotter.add_mesh(part, smooth_shading=True, ambient=0.3, **look, **_STILL)
-            drawn.append(np.asarray(part.points))
+    for part, look in _bodies(around, box):
+        plotter.add_mesh(part, **look)
+        drawn.append(np.asarray(part.points))
     if around.absent:
         corner = tuple(0.03 * length for length in plotter.window_size)
         text = "\n".join(f"{name} not shown" for name in around.absent)
         plotter.add_text(text, position=corner, font_size=10 * plotter.window_size[1] / _PLAIN, color="black", render=False)
     return drawn
+
+
+def _bodies(around: Surroundings, box: Box) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """The parts of bodies with their looks."""
+    for body in around.near:
+        look: dict[str, Any] = {"color": "0.6", "opacity": 0.25} if body.rigid else {"color": _SOURCE}
+        for part in _parts(body, 0.1 * box.size):
+            yield part, look | _STILL | {"smooth_shading": True, "ambient": 0.3}
+
+
+class MovingBodies:
+    """Bodies of scenes one after the other in one picture, such as a magnet that comes and goes.
+
+    Parameters
+    ----------
+    plotter : Plotter
+        In which the bodies of the first scene are not drawn yet.
+    scenes : sequence of Scene
+    box : Box
+    """
+
+    def __init__(self, plotter: pyvista.Plotter, scenes: Sequence[Scene], box: Box) -> None:
+        self._plotter, self._box = plotter, box
+        self._actors: list[Any] = []
+        self._shown: Any = None
+        self.points = [
+            np.array([[x * rho, y * rho, z] for body in surroundings(scene, box).near for rho, z in body.points for x, y in _ROUND])
+            for scene in scenes
+        ]
+
+    def show(self, scene: Scene) -> None:
+        """The bodies of a scene, in place of those before."""
+        if (scene.sources, scene.obstacles) == self._shown:
+            return
+        for actor in self._actors:
+            self._plotter.remove_actor(actor, render=False)
+        parts = _bodies(surroundings(scene, self._box), self._box)
+        self._actors = [self._plotter.add_mesh(part, **look) for part, look in parts]
+        self._shown = scene.sources, scene.obstacles
 
 
 def _parts(body: Outline, size: float) -> list[Any]:
@@ -402,8 +450,8 @@ def polydata(revolution: Revolution, points: Array) -> pyvista.PolyData:
     return pyvista.PolyData(points, faces=np.concatenate(faces))
 
 
-def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18) -> None:
-    """Look from the front and a little from above, so that the points fill the picture beside the colour scale."""
+def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: float = 0.18, words: float = 0.0) -> None:
+    """Look from the front and a little from above, so that the points fill what words at the top and the colour scale leave."""
     toward = np.array([0.3, -1.0, 0.45])
     toward /= np.linalg.norm(toward)
     right = np.cross([0.0, 0.0, 1.0], toward)
@@ -412,9 +460,9 @@ def aim(plotter: pyvista.Plotter, points: Array, *, margin: float = 0.08, bar: f
     x, y, depth = points @ right, points @ up, np.ptp(points @ toward) + 1.0
     aspect = plotter.window_size[0] / plotter.window_size[1]
     # height of the picture in units of the scene
-    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin)
+    height = max(np.ptp(y), np.ptp(x) / (aspect * (1 - bar))) / (1 - 2 * margin - words)
     centre = (x.min() + x.max()) / 2 * right + (y.min() + y.max()) / 2 * up + (points @ toward).mean() * toward
-    centre = centre + bar / 2 * aspect * height * right
+    centre = centre + bar / 2 * aspect * height * right + words / 2 * height * up
     plotter.enable_parallel_projection()
     plotter.camera.focal_point, plotter.camera.up = tuple(centre), tuple(up)
     plotter.camera.position = tuple(centre + 10 * depth * toward)

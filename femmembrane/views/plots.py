@@ -30,6 +30,7 @@ from .figures import (
     save_axes,
     save_figure,
     show_in_notebooks,
+    tell_apart,
     verdict_style,
 )
 from .labels import add_label
@@ -68,6 +69,7 @@ __all__ = [
     "plot_profiles",
     "plot_zones",
     "save_figure",
+    "tell_apart",
     "verdict_style",
 ]
 

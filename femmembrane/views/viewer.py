@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,10 +16,12 @@ from ..errors import InputError
 from ..files import replace_file
 from ..quantities import SCALED, Units, caption, in_si, words
 from ..results.analyses import remarks
+from ..results.tipped import TippedBranch, TippedEquilibrium
 from .modes import ModeSurface, draw_moved, render_mode, set_up_motion
 from .movie import Frame, check_movie, write_movie
-from .picture import DrawnMembrane, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
+from .picture import DrawnMembrane, MovingBodies, Surface, aim, check_quantity, draw_key, draw_surroundings, frame, new_plotter
 from .surroundings import Box, place_of
+from .tipped import COLOR, WavySurface
 
 if TYPE_CHECKING:
     import pyvista
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 #: who is told of each frame of a movie: its number, counted from 1, and how many there are
 OnFrame: TypeAlias = Callable[[int, int], object]
 #: sizes of a window and a picture, and of a movie
+DEFAULT_COLOR = "stretch_2"
 SIZE, MOVIE_SIZE = (1200, 900), (720, 540)
 #: sectors and points along a meridian of a surface of which many are shown: it is round to a third of a pixel
 SECTORS_SHOWN, POINTS_SHOWN = 72, 73
@@ -43,9 +46,9 @@ _HOLD, _PAUSE = 1.5, 50
 
 
 def view(
-    shown: Branch | Equilibrium,
+    shown: Branch | Equilibrium | TippedBranch | TippedEquilibrium,
     *,
-    color: str = "stretch_2",
+    color: str = DEFAULT_COLOR,
     step: int | None = None,
     mode: int | None = None,
     screenshot: str | PathLike[str] | None = None,
@@ -60,9 +63,10 @@ def view(
 
     Parameters
     ----------
-    shown : Branch or Equilibrium
+    shown : Branch, Equilibrium, TippedBranch or TippedEquilibrium
     color : str
         What the colour shows: a stretch or a stress of the profile (``stretch_1``, ``total_stress_2``, ...), or ``zone``.
+        Of states with waves around the axis it is the size of their waves.
     step : int, optional
         The equilibrium of a picture or of a mode; in a window, the one shown first. Default: the last. Negative steps count from the end.
     mode : int, optional
@@ -86,12 +90,15 @@ def view(
     SolveError
         For a mode of a state that has no natural modes.
     """
-    branch = list(shown) if isinstance(shown, Sequence) else [shown]
+    branch: list[Any] = list(shown) if isinstance(shown, Sequence) else [shown]
     if not branch:
         raise InputError("branch", "no equilibria", "a branch with one or more equilibria is needed")
     chosen_units = Units.of(units, branch[0].scene.converter)
-    color = in_si(color) if chosen_units.unit(color) else color
-    check_quantity(color, branch[0].scene, "color")
+    if isinstance(branch[0], TippedEquilibrium):
+        color = _color_of_waves(color, mode)
+    else:
+        color = in_si(color) if chosen_units.unit(color) else color
+        check_quantity(color, branch[0].scene, "color")
     place = place_of(step, len(branch))
     if movie is not None:
         check_movie(movie)
@@ -146,17 +153,46 @@ class _Stage:
     units: Units = SCALED
 
     def __post_init__(self) -> None:
-        self.surfaces = [Surface.of(equilibrium, self.color, SECTORS_SHOWN, POINTS_SHOWN) for equilibrium in self.branch]
+        self.surfaces = [_surface(equilibrium, self.color) for equilibrium in self.branch]
         self.limits = min(s.range[0] for s in self.surfaces), max(s.range[1] for s in self.surfaces)
-        box = Box.of([{"rho": s.rho, "eta": s.eta} for s in self.surfaces])
+        boxes = [s.box for s in self.surfaces]
+        box = Box(max(b.radius for b in boxes), min(b.low for b in boxes), max(b.high for b in boxes))
         self.membrane = DrawnMembrane(self.plotter, self.limits, box.size)
-        drawn = draw_surroundings(self.plotter, self.branch[0].scene, box)
+        self.bodies = None
+        scenes = [equilibrium.scene for equilibrium in self.branch]
+        if all((scene.sources, scene.obstacles) == (scenes[0].sources, scenes[0].obstacles) for scene in scenes):
+            drawn = draw_surroundings(self.plotter, scenes[0], box)
+        else:
+            self.bodies = MovingBodies(self.plotter, scenes, box)
+            drawn = self.bodies.points
         draw_key(self.plotter, self.surfaces[0], self.limits)
-        aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11)
+        lines = max(self.caption(k).count("\n") for k in range(len(self.branch)))
+        aim(self.plotter, np.concatenate([*drawn, *(s.points for s in self.surfaces)]), margin=0.11, words=_further(lines))
 
     def draw(self, index: int) -> None:
         self.membrane.show(self.surfaces[index])
-        write_caption(self.plotter, _caption(self.branch[index], self.numbers[index], self.total, self.units))
+        if self.bodies is not None:
+            self.bodies.show(self.branch[index].scene)
+        write_caption(self.plotter, self.caption(index))
+
+    def caption(self, index: int) -> str:
+        """The words beside a step."""
+        return _caption(self.branch[index], self.numbers[index], self.total, self.units)
+
+
+def _surface(equilibrium: Equilibrium | TippedEquilibrium, color: str) -> Surface:
+    if isinstance(equilibrium, TippedEquilibrium):
+        return WavySurface.of_tipped(equilibrium, SECTORS_SHOWN)
+    return Surface.of(equilibrium, color, SECTORS_SHOWN, POINTS_SHOWN)
+
+
+def _color_of_waves(color: str, mode: int | None) -> str:
+    """What the colour of states with waves shows, or InputError for a colour or a mode that they do not have."""
+    if mode is not None:
+        raise InputError("mode", mode, "modes in motion are those of axisymmetric equilibria; of states with waves it is left out")
+    if color not in (COLOR, DEFAULT_COLOR):
+        raise InputError("color", color, f"of states with waves around the axis {COLOR!r} is allowed, which needs not be given")
+    return COLOR
 
 
 def _frames(stage: _Stage) -> Iterator[Frame]:
@@ -176,14 +212,22 @@ def _told(frames: Iterator[Frame], total: int, on_frame: OnFrame | None) -> Iter
 def write_caption(plotter: pyvista.Plotter, text: str) -> None:
     """Lines at the upper left, in place of those before."""
     width, height = plotter.window_size
-    low = 0.9 - 0.035 * max(text.count("\n") - 1, 0)  # the first line stays where it is
+    low = 0.9 - _further(text.count("\n"))  # the first line stays where it is
     plotter.add_text(text, position=(0.03 * width, low * height), font_size=11 * height / 720, color="black", name="caption", render=False)
+
+
+def _further(breaks: int) -> float:
+    """What a caption takes of the height beyond two lines."""
+    return 0.035 * max(breaks - 1, 0)
 
 
 def _caption(equilibrium: Equilibrium, number: int, total: int, units: Units = SCALED) -> str:
     height = f"{words('center_height')} {units.factor('center_height') * equilibrium.center_height:.4g} {units.unit('center_height')}"
     numbers = f"{caption(equilibrium.volume, equilibrium.pressure, '   ', units)}   {height.rstrip()}"
-    answers = [remark.caption for remark in remarks(equilibrium) if remark.caption]
+    if isinstance(equilibrium, TippedEquilibrium):
+        answers = [f"{equilibrium.waves} wave{'s' if equilibrium.waves > 1 else ''} around the axis, amplitude {equilibrium.amplitude:.3g}"]
+    else:
+        answers = [remark.caption for remark in remarks(equilibrium) if remark.caption]
     step = f"step {number}/{total - 1}   " if total > 1 else ""
     return "\n".join([step + numbers, *textwrap.wrap(", ".join(answers), _LINE)])
 

@@ -165,7 +165,7 @@ def test_a_slider_moves_the_curve(server: ThreadingHTTPServer) -> None:
         for k in range(1, 11):
             page.call("Input.dispatchMouseEvent", type="mouseMoved", x=middle + k * width / 25, y=y, button="left")
         page.call("Input.dispatchMouseEvent", type="mouseReleased", x=middle + 10 * width / 25, y=y, button="left")
-        page.wait(f"data.version > {start} && !live.busy && !live.asked")
+        page.wait(f"data.version > {start} && live.settled === data.version")
         strength = page.ask("live.values['source.0.strength']")
         assert 250 < strength < 350
         scene = SCENE.replace(sources=[fm.Dipole(strength=strength, height=6.5)])
@@ -177,8 +177,32 @@ def test_a_slider_moves_the_curve(server: ThreadingHTTPServer) -> None:
             fm.equilibrium(scene, volume=30.0, solver="newton").center_height, rel=1e-3
         )
         assert " ms, error " in page.ask("byId('cost').textContent")
+        assert not page.ask("byId('diagram').parentElement.classList.contains('sketched')")
         page.ask("[...document.querySelectorAll('button')].find((b) => b.textContent === 'Add to comparison').click()")
         assert page.ask("compared.length") == 1
         page.ask("(() => { const s = document.querySelector('[name=accuracy]'); s.value = 0; s.oninput(); })()")
         page.wait("byId('cost').textContent.startsWith('4 elements')")
+        assert page.errors == []
+
+
+@needs_browser
+def test_the_curve_that_is_sketched_while_a_hand_moves_is_that_of_the_diagram(server: ThreadingHTTPServer) -> None:
+    """Its last corner, in pixels, is the last equilibrium on the axes of the diagram; a curve that leaves them has new axes."""
+    with browser() as page:
+        page.open(address(server))
+        page.ask("ask()")
+        page.wait("!live.busy")
+        found = page.ask(
+            "(() => { clearTimeout(live.idle); sketch(); const of = byId('diagram')._fullLayout, last = data.lines[data.lines.length - 1],"
+            " [x, y] = ['across', 'up'].map((id) => column(byId(id).value)), paths = [...byId('sketch').querySelectorAll('path')];"
+            " const drawn = paths[paths.length - 1].getAttribute('d').split('L').pop().split(' ').map(Number);"
+            " return [drawn, [of.xaxis.l2p(last.values[x].at(-1)), of.yaxis.l2p(last.values[y].at(-1))], of.xaxis.range]; })()"
+        )
+        assert found[0] == pytest.approx(found[1], abs=0.06)
+        assert found[2][1] < 60  # the branch ends at V = 30
+        assert page.ask(
+            "(() => { Plotly.relayout('diagram', { 'xaxis.range': [0, 100] }); return sketch(); })()"
+        )  # axes that a hand has set
+        assert page.ask("(() => { Plotly.relayout('diagram', { 'xaxis.autorange': true }); return sketch(); })()")
+        assert not page.ask("(() => { data.lines[0].values = data.lines[0].values.map((c) => c.map((v) => 4 * v)); return sketch(); })()")
         assert page.errors == []

@@ -123,6 +123,14 @@ def test_parts_of_a_quadratic_form(name):
         np.testing.assert_allclose(found, expected, rtol=0, atol=atol)
 
 
+@pytest.mark.parametrize("name", SHAPES)
+def test_kinks(name):
+    """As the arrays of NumPy have them."""
+    potential = potential_of(SHAPES[name])
+    x = dome(potential) + np.random.default_rng(3).normal(scale=0.01, size=potential.space.n_free)
+    np.testing.assert_allclose(potential.elements.kinks(potential.space, x), potential.space.kinks(x), rtol=1e-12, atol=1e-13)
+
+
 def test_blocks_are_met_whole_and_in_part():
     assert potential_of(SHAPES["many blocks"]).n_points > 2 * BLOCK
     assert potential_of(SHAPES["many blocks"]).space.n_elements % (BLOCK // 3 // 4 * 4) % 4 != 0
@@ -328,6 +336,8 @@ def test_wrong_arrays_are_refused():
     for name, mode, part in (("x", np.zeros(n - 1), weights), ("weights", np.zeros(n), weights[1:])):
         with pytest.raises(ValueError, match=name):
             elements.form_parts(densities, mode, part)
+    with pytest.raises(ValueError, match="jumps"):
+        elements.kinks(np.zeros(n), *potential.space.ends_of_elements[:3], 3, np.zeros(potential.space.n_elements))
     with pytest.raises(ValueError, match="band"):
         module.Factor(np.zeros((3, 4)), 4, 1)
     tape = record_tape(potential.point_function, module.OPERATIONS)

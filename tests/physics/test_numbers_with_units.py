@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from femmembrane.errors import InputError
+import femmembrane as fm
+from femmembrane.errors import InputError, as_meant
 from femmembrane.physics.units import EXAMPLES, has_unit, in_unit
 
 
@@ -84,3 +85,41 @@ def test_another_kind_is_refused_with_what_is_allowed():
 def test_examples_are_what_they_are_examples_of(unit):
     for text in EXAMPLES[unit].split('"')[1::2]:
         assert in_unit("key", text, unit)[1] == unit
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("12,5 mm", "write 12.5 mm:"),
+        ("12,5", "write 12.5:"),
+        ("1,000 mm", "write 1.000 mm or 1000 mm:"),
+        ("1.234,5 mm", "write 1234.5 mm:"),
+        ("1,234.5 mm", "write 1234.5 mm:"),
+        ("1 000 mm", "write 1000 mm:"),
+        ("1'000'000 Pa", "write 1000000 Pa:"),
+        ("-2,5e-3 m", "write -2.5e-3 m:"),
+        ("\N{MINUS SIGN}3 mm", "write -3 mm"),
+        ("25", "leave the quotes out"),
+        ("1 inch", "write in"),
+        ("2 mil", "write 1e-3 in"),
+        ("5 millimetres", "write mm"),
+        ("5 MM", "write mm"),
+        ("5 mm.", "write mm"),
+    ],
+)
+def test_a_number_written_otherwise_is_understood_and_refused(text, meant):
+    with pytest.raises(InputError) as error:
+        fm.Scene.from_dict({"material": {"model": "neo-hookean"}, "scales": {"radius": text, "thickness": 1e-4, "shear_modulus": 1e5}})
+    assert error.value.key == "scales.radius"
+    assert meant in error.value.allowed
+
+
+@pytest.mark.parametrize("text", ["", "mm", "neo-hookean", "1 - 0.4*R**2", "1,2,3", "25 mm", "1.5 kPa", "1.2.3", "v1,5"])
+def test_other_texts_are_not_taken_for_numbers(text):
+    assert as_meant(text) == ""
+
+
+def test_a_name_that_looks_like_a_number_is_a_name():
+    with pytest.raises(InputError) as error:
+        fm.Scene.from_dict({"material": {"model": "25"}})
+    assert "quotes" not in str(error.value)

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 import femmembrane as fm
-from femmembrane.scene.absurd_loads import remarks_on_loads
+from femmembrane.scene.absurd_loads import remarks_on_direction, remarks_on_loads, remarks_on_scales
 
 #: mu T/R0 = 1360 Pa, as R0 = 5 cm, T = 50 um, mu = 1.36 MPa
 SCALES = fm.Scales(radius=0.05, thickness=5e-5, shear_modulus=1.36e6)
@@ -74,3 +74,35 @@ def test_the_branch_says_so():
     (note,) = dataclasses.replace(branch, scene=asked).notes
     assert note == remarks_on_loads(asked)[0]
     assert note in str(dataclasses.replace(branch, scene=asked))
+
+
+@pytest.mark.parametrize(
+    ("scales", "said"),
+    [
+        ((25.0, 3e-7, 4e5), "scales.thickness = 3e-07 m is 1.2e-08 times the radius, 25 m"),
+        ((0.025, 0.3, 4e5), "scales.thickness = 0.3 m is 12 times the radius, 0.025 m"),
+        ((2.5e4, 0.3, 4e5), "scales.radius = 25000 m"),
+        ((0.025, 3e-4, 0.4), "scales.shear_modulus = 0.4 Pa"),
+    ],
+)
+def test_scales_meant_in_other_units(scales, said):
+    (remark,) = remarks_on_scales(fm.Scales(*scales))
+    assert remark.startswith(said)
+    assert '"25 mm" and "0.4 MPa" are understood too' in remark
+
+
+def test_scales_of_cells_and_balloons_are_not_remarkable():
+    for radius, thickness, modulus in ((5e-6, 5e-9, 1e3), (20.0, 2e-5, 1e8), (0.05, 5e-5, 1.36e6), (0.01, 5e-3, 1e4)):
+        assert remarks_on_scales(fm.Scales(radius, thickness, modulus)) == ()
+    assert remarks_on_scales(None) == ()
+
+
+def test_a_branch_that_sets_out_away_from_its_end_is_remarked_before_it_is_followed():
+    (remark,) = remarks_on_direction(scene(control="arc-length", start=5.0, until={"volume": 1.0}))
+    assert remark == "run.direction = 1: it sets out from V = 5, away from run.until.volume = 1; -1 sets out the other way"
+    for run in (
+        {"start": 5.0, "until": {"volume": 1.0}, "direction": -1},
+        {"start": 1.0, "until": {"volume": 5.0}},
+        {"start": 5.0, "until": {"center_height": 1.0}},  # which turns back
+    ):
+        assert remarks_on_direction(scene(control="arc-length", **run)) == ()

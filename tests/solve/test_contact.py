@@ -224,8 +224,6 @@ def test_between_two_equilibria_of_a_branch():
         ("obstacle", lambda: plate(elements=4).replace(obstacles=[fm.Plane(0.5), fm.Ball(height=0.7, radius=0.3)])),
         ("obstacle", lambda: plate(elements=4).replace(obstacles=3)),
         ("obstacle", lambda: plate(elements=4).replace(obstacles=[3])),
-        ("effects.tension_field", lambda: plate(elements=4, tension_field=True)),
-        ("mesh.accuracy", lambda: fm.Scene(material=NH, mesh=fm.disc(accuracy=1e-3), obstacles=[fm.Plane(0.5)])),
         ("over", lambda: fm.vary(plate(elements=4), "material.alpha", [1.0], hold={"pressure": 0.0})),
     ],
 )
@@ -409,3 +407,33 @@ def test_a_body_on_the_wrong_side_is_not_said_to_cut(body, said):
         fm.Scene(material=NH, mesh=fm.disc(4), obstacles=[body])
     assert said in str(error.value)
     assert str(error.value).endswith("other side") is said.endswith("other side")
+
+
+def test_the_curve_of_a_branch_has_its_corner_where_contact_begins():
+    """Cubics on either side of the touch of a ball have the directions of their own side."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), prestretch=1.2, obstacles=[fm.Ball(0.8, 0.5)])
+    branch = fm.trace(scene, start=0.3, until={"pressure": 1.2})
+    (touch,) = branch.special_points
+    pieces = [piece for run in branch.curve.runs for piece in run]
+    before, after = (next(piece for piece in pieces if end(piece).special is touch) for end in (lambda p: p.b, lambda p: p.a))
+    for piece, away in ((before, -1), (after, 1)):  # dP/dV on either side, from states next to the touch
+        near = fm.equilibrium(scene, volume=touch.volume * (1 + away * 1e-6), start=touch.equilibrium)
+        rates = piece.arc.rates[1 if away < 0 else 0]
+        assert rates[1] / rates[0] == pytest.approx((near.pressure - touch.pressure) / (near.volume - touch.volume), rel=1e-3)
+    assert before.arc.rates[1][1] / before.arc.rates[1][0] != pytest.approx(after.arc.rates[0][1] / after.arc.rates[0][0], rel=0.01)
+
+
+def test_a_drawn_force_is_a_curve_on_each_side_of_the_touch():
+    """The line between equilibria is that of the states there, and no cubic swings below zero before the touch."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), prestretch=1.2, obstacles=[fm.Ball(0.8, 0.5)])
+    branch = fm.trace(scene, start=0.3, until={"pressure": 1.6})
+    lines = branch.curve.lines(["pressure", "contact_force", "contact_radius"])
+    line = np.concatenate([lines[id(piece)] for run in branch.curve.runs for piece in run])
+    pressure, force, radius = line.T
+    touch = branch.special_points[0].pressure
+    assert np.abs(force[pressure <= touch]).max() < 1e-12
+    assert (np.diff(force[pressure >= touch]) >= -1e-12).all()
+    assert (np.diff(radius[pressure > touch]) >= -1e-12).all()
+    middle = (branch[-2].pressure + branch[-1].pressure) / 2
+    exact = fm.equilibrium(scene, pressure=middle).contact.force
+    assert np.interp(middle, pressure, force) == pytest.approx(exact, rel=2e-3)

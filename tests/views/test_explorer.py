@@ -288,6 +288,44 @@ def test_readable_on_a_phone(branch: fm.Branch, tmp_path: Path) -> None:
         assert page.errors == []
 
 
+@pytest.fixture(scope="module")
+def below() -> fm.Branch:
+    """Above a strong dipole, which tips the membrane over: b = -43.18, so that it jumps (two independent codes)."""
+    asked = fm.Analysis(("volume",), azimuthal_modes=(1,))
+    dipole = fm.Dipole(strength=600, height=-3.5)
+    scene = fm.Scene(material=OGDEN, sources=[dipole], susceptibility=2.5, mesh=fm.disc(8), degree=6, analysis=asked)
+    return fm.trace(scene, start=0.5, direction=-1, until={"center_height": 0.3})
+
+
+def test_an_onset_says_whether_the_membrane_jumps_there(below: fm.Branch) -> None:
+    data = page_data(below, shapes=False)
+    onset = next(state for state in data["states"] if state["kind"] == "azimuthal_onset")
+    assert onset["after"] == "subcritical"
+    assert onset["word"] == "azimuthal onset, subcritical"
+    assert "b = -43.18" in dict(onset["answers"])["beyond it"]
+    others = [state for state in data["states"] if state["kind"] not in (None, "azimuthal_onset")]
+    assert all(state["after"] == "" and "beyond it" not in dict(state["answers"]) for state in others)
+
+
+@needs_browser
+def test_the_key_and_waves_in_motion(below: fm.Branch, tmp_path: Path) -> None:
+    """The key names the onset with a filled marker; short waves are drawn with enough sectors to be round, and low enough to be waves."""
+    below.explore(tmp_path / "page.html")
+    with browser() as page:
+        page.open((tmp_path / "page.html").as_uri())
+        assert "azimuthal onset, subcritical" in page.ask("byId('key').textContent")
+        assert page.ask("byId('key').querySelector('polygon').getAttribute('fill') === css('--ink')")
+        assert "b = " in page.ask("(() => { byId('points').querySelector('button').click(); return byId('answers').textContent; })()")
+        page.wait("window.explorer.drawn === shown")
+        page.ask("(() => { const m = drawn.modes.find((m) => m.n === 1); m.n = 40; byId('mode').value = drawn.modes.indexOf(m); })()")
+        page.ask("space()")
+        assert page.ask("byId('space').data[0].x.length / drawn.rho.length") == 8 * 40
+        assert page.ask("amplitude(chosenMode(drawn)) < 2 * Math.PI * data.box[0] / 40 / 2")
+        page.ask("byId('motion').click()")
+        page.wait("phase < 0.9")
+        assert page.errors == []
+
+
 # --- in a notebook
 
 

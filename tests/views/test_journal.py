@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import matplotlib.style
 import numpy as np
 import pytest
 from matplotlib import rc_context
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -139,3 +141,30 @@ def test_a_legend_never_covers_a_line(branch: fm.Branch) -> None:
     free.plot([0, 1], [1, 0])
     free.legend(loc="upper right")
     assert figures.covers(free.get_legend(), free)
+
+
+def test_many_curves_are_told_apart_in_grey_as_well() -> None:
+    """Of 28 curves no two have the same look, and next to each other neither lightness nor dashes are the same."""
+    axes = Figure().subplots()
+    plots.tell_apart(axes)
+    lines = [axes.plot([0, k])[0] for k in range(28)]
+    assert len({(line.get_color(), str(line._dash_pattern)) for line in lines}) == 28
+    for a, b in itertools.pairwise(lines):
+        assert a._dash_pattern != b._dash_pattern
+        assert abs(lightness(a.get_color()) - lightness(b.get_color())) > 0.06
+
+
+def lightness(color: str) -> float:
+    return float(np.dot((0.2126, 0.7152, 0.0722), to_rgb(color)))
+
+
+def test_a_legend_takes_the_corner_that_is_free() -> None:
+    """Matplotlib's choice, the corner above the steep part of a curve, is nearer to the curve than it may be: another one is free."""
+    _, axes = plots.new_figure((6.4, 4.6), title="a curve that levels off")
+    x = np.linspace(0.0, 10.0, 201)
+    axes.plot(x, np.tanh(x / 2.5), label="a name that is as long as a verdict")
+    plots.draw_legend(axes)
+    inside, box = axes.get_window_extent(), axes.get_legend().get_window_extent()
+    assert inside.contains(*box.min)
+    assert inside.contains(*box.max)
+    assert not figures.covers(axes.get_legend(), axes)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 
 import femmembrane as fm
+from femmembrane.views import plots
+from femmembrane.views.tex import in_tex
 
 SCENE = fm.Scene(
     material=fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0)), mesh=fm.disc(8), analysis=fm.Analysis(("pressure", "volume"))
@@ -103,6 +109,38 @@ def test_pgf_says_what_it_needs(branch: fm.Branch, tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(fm.InputError, match="LaTeX is needed"):
         branch.plot(tmp_path / "figure.pgf")
+
+
+@pytest.mark.parametrize(
+    ("words", "math", "tex"),
+    [
+        ("volume V/R₀³", True, "volume V/R$_{0}$$^{3}$"),
+        ("μ λ Λ Ω Α ο", True, r"$\mu$ $\lambda$ $\Lambda$ $\Omega$ Α ο"),  # noqa: RUF001  # TeX has no Alpha
+        ("−0.5 ± 1 … µT", True, r"$-$0.5 $\pm$ 1 \dots{} $\mu$T"),  # noqa: RUF001
+        ("$10^{-3}$ & ü", True, "$10^{-3}$ & ü"),
+        (r"5 $ & #1 {x} ~ \z", False, r"5 \$ \& \#1 \{x\} \textasciitilde{} \textbackslash{}z"),
+    ],
+)
+def test_texts_for_tex(words: str, math: bool, tex: str) -> None:
+    assert in_tex(words, math) == tex
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no LaTeX is installed")
+def test_a_document_reads_pgf(branch: fm.Branch, tmp_path: Path) -> None:
+    """Its words are set by the document, whose LaTeX need not know Greek letters; and the figure has its own words again afterwards."""
+    scene = branch.scene.replace(title="50 % & $")
+    axes = dataclasses.replace(branch, scene=scene).plot()
+    with rc_context({"pgf.texsystem": "pdflatex"}):
+        plots.save_figure(axes.figure, tmp_path / "a.pgf")
+    assert axes.get_xlabel() == "volume V/R₀³"
+    words = (tmp_path / "a.pgf").read_text(encoding="utf-8")
+    assert "stable under both controls" in words
+    assert "R$_{0}$$^{3}$" in words
+    head = r"\documentclass{article}\usepackage{pgf}\def\mathdefault#1{#1}"
+    (tmp_path / "paper.tex").write_text(head + r"\begin{document}\input{a.pgf}\end{document}", encoding="utf-8")
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, check=False).returncode == 0
+    assert (tmp_path / "paper.pdf").stat().st_size > 1000
 
 
 def test_a_uniform_stretch_is_level() -> None:

@@ -63,7 +63,7 @@ def test_a_mode_moves_and_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """From a saved branch to a picture of one step, without a word; the zones are those of the equilibrium."""
+    """From a saved branch to a picture of one step; the zones are those of the equilibrium."""
     branch().save(tmp_path / "branch.nc")
     assert main(["view", str(tmp_path), "--step", "0", "--color", "zone", "--screenshot", str(tmp_path / "a.png")]) == 0
     from matplotlib.image import imread
@@ -71,7 +71,7 @@ def test_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     image = imread(tmp_path / "a.png")[..., :3]
     assert image.shape == (900, 1200, 3)
     assert 0.1 < (image[100:, :900].min(axis=2) < 0.9).mean() < 0.9
-    assert capfd.readouterr() == ("", "")
+    assert capfd.readouterr() == (f"written: {tmp_path / 'a.png'}\n", "")
 
 
 def test_zones_are_coloured_between_their_borders() -> None:
@@ -215,3 +215,15 @@ def test_normals_of_a_sphere_point_along_the_radius() -> None:
 @pytest.mark.parametrize(("limits", "digits"), [((0.0, 7.65), 3), ((0.993, 1.004), 4), ((1.0, 1.00002), 7), ((2.0, 2.0), 3)])
 def test_numbers_at_a_scale_differ(limits: tuple[float, float], digits: int) -> None:
     assert picture._digits(limits) == digits
+
+
+def test_words_at_the_top_have_room() -> None:
+    """Nothing that is drawn is higher than the margin and the words leave, and the rest of the picture is filled."""
+    points = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 4.0)])
+    for words in (0.0, 0.07):
+        with picture.new_plotter((400, 400)) as plotter:
+            picture.aim(plotter, points, margin=0.11, words=words)
+            camera = plotter.camera
+            height = (points - np.array(camera.focal_point)) @ np.array(camera.up) / (2 * camera.parallel_scale) + 0.5
+        assert height.min() == pytest.approx(0.11)
+        assert height.max() == pytest.approx(1 - 0.11 - words)

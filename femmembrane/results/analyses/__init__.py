@@ -22,6 +22,7 @@ from .verdicts import Verdicts
 from .wrinkled_zones import WrinkledZones
 
 if TYPE_CHECKING:
+    from ...potential import Evaluation
     from ...scene import Scene
     from ..equilibrium import Equilibrium
 
@@ -30,6 +31,8 @@ _VERDICTS = Verdicts()
 ANALYSES: tuple[EquilibriumAnalysis, ...] = (_VERDICTS, Electrics(), SIColumns(), WrinkledZones(), ErrorEstimates(), ContactWithBodies())
 #: those that a scene asks for by name, in ``analysis.extra``
 EXTRA: dict[str, EquilibriumAnalysis] = {}
+#: those by keys that answer while an equilibrium is recorded, which a branch asks at every step
+_AT_ONCE = tuple(analysis for analysis in ANALYSES if type(analysis).compute is not EquilibriumAnalysis.compute)
 
 
 def registered() -> tuple[EquilibriumAnalysis, ...]:
@@ -45,10 +48,22 @@ def asked(scene: Scene) -> Sequence[EquilibriumAnalysis]:
     InputError
         For a name that nobody registered.
     """
-    found = [analysis for analysis in ANALYSES if analysis.asked(scene)]
-    for k, name in enumerate(scene.analysis.extra):
-        found.append(_named(f"analysis.extra[{k}]", name))
-    return found
+    return [*(analysis for analysis in ANALYSES if analysis.asked(scene)), *_named_by(scene)]
+
+
+def answer_at_once(equilibrium: Equilibrium, before: Equilibrium | None, evaluation: Evaluation) -> None:
+    """Find the answers that are found while an equilibrium is recorded, see :meth:`.EquilibriumAnalysis.compute`."""
+    scene = equilibrium.scene
+    for analysis in _AT_ONCE:
+        if analysis.asked(scene):
+            analysis.compute(equilibrium, before, evaluation)
+    if scene.analysis.extra:
+        for analysis in _named_by(scene):
+            analysis.compute(equilibrium, before, evaluation)
+
+
+def _named_by(scene: Scene) -> list[EquilibriumAnalysis]:
+    return [_named(f"analysis.extra[{k}]", name) for k, name in enumerate(scene.analysis.extra)]
 
 
 def _named(key: str, name: str) -> EquilibriumAnalysis:

@@ -44,11 +44,11 @@ class Verdicts(EquilibriumAnalysis):
         """Started from the modes of the equilibrium before, with the factors that the evaluation has."""
         potential, state = evaluation.potential, (equilibrium.state, equilibrium.pressure, evaluation)
         for p in equilibrium.scene.analysis.verdicts:
-            guess = None if before is None or p.azimuthal == ALL else _verdict(before, p).coefficients
+            guess = None if before is None or p.azimuthal == ALL else before.verdict(p.control, azimuthal=p.azimuthal).coefficients
             enclosed = equilibrium.enclosed if p.control == "gas" else None
             compliance = enclosed.compliance(equilibrium.volume) if enclosed else None
-            ask = partial(door.checked_verdict, potential, *state, p.control, p.azimuthal, guess=guess, compliance=compliance)
-            equilibrium.remembered(("verdict", p.control, p.azimuthal), ask)
+            verdict = door.checked_verdict()(potential, *state, p.control, p.azimuthal, guess=guess, compliance=compliance)
+            equilibrium.remember(("verdict", p.control, p.azimuthal), verdict)
 
     # --- tables
 

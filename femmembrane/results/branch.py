@@ -330,7 +330,8 @@ class Branch(Sequence[Equilibrium]):
             sizes = sorted({(eq.scene.mesh.elements, eq.scene.degree) for eq in self.equilibria})
             (fewest, _), (most, degree) = sizes[0], sizes[-1]
             count = sum(a.scene.mesh != b.scene.mesh for a, b in pairwise(self.equilibria))
-            chosen = f"changed {count} times along the branch for accuracy {in_words(getattr(mesh, 'accuracy', None) or 0.0)}"
+            often = "once" if count == 1 else f"{count} times"
+            chosen = f"changed {often} along the branch for accuracy {in_words(getattr(mesh, 'accuracy', None) or 0.0)}"
             return f"mesh: {fewest} to {most} elements of degree {degree}, graded, {chosen}"
         accuracy, estimated = (getattr(mesh, name, None) for name in ("accuracy", "estimated"))
         if accuracy is None or estimated is None:

@@ -57,7 +57,7 @@ def draw_curve(axes: Any, branch: fm.Branch, inflated: fm.Equilibrium) -> None:
     axes.set_ylim(0, 2.05)
     axes.set_title(r"Equilibria of a disc below a dipole, $M = 200$, $h = 6.5\,R_0$", fontsize=13, loc="left")
     plots.draw_legend(
-        axes, "among axisymmetric shapes:", fontsize=11, title_fontsize=11, loc="lower left", bbox_to_anchor=(0.13, 0.02), labelspacing=0.3
+        axes, "among axisymmetric shapes:", fontsize=9, title_fontsize=9, loc="lower left", bbox_to_anchor=(0.13, 0.02), labelspacing=0.3
     )
     inset = axes.inset_axes((0.60, 0.485, 0.36, 0.225))
     plots.draw_branch(inset, branch, dots=False)

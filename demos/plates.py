@@ -1,7 +1,7 @@
 """A balloon between two plates that close: where it is compressed first, and whether it wrinkles there.
 
 Half a neo-Hookean ball that was inflated to a stretch, with a mirror at its equator, below a frictionless plate that comes down. Held is
-the enclosed volume, or the amount of gas in it. It is said that such a balloon wrinkles from the border of contact on. In this model it does
+the enclosed volume, or the amount of gas in it. It is said that such a balloon wrinkles from the border of contact on. Here it does
 not. Along the plate, where the pressure of contact is P, the tensions per length obey
 
     d(rho T_1)/drho = T_2,        beyond its border    d(rho T_1 cos phi)/ds = T_2 - P rho sin phi,    phi the slope of the meridian.

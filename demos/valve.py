@@ -79,13 +79,26 @@ def turned(angles: Sequence[float], start: fm.Equilibrium) -> list[fm.Equilibriu
 
 def draw(angles: Sequence[float], there: list[fm.Equilibrium], back: list[fm.Equilibrium], limit: float, path: Path) -> None:
     figure, (left, right) = plots.new_figure((10.5, 4.8), title=SCENE.title, widths=(1.4, 1))
-    left.plot(angles, [eq.volume for eq in there], "o-", ms=4, color=plots.BOTH.color, label="turned")
-    left.plot(angles, [eq.volume for eq in back], "--", color=plots.VOLUME_ONLY.color, label="turned back")
-    left.axvline(limit, color="0.6", linewidth=1.0)
-    left.set(xlabel="angle of the magnet in degrees", ylabel="volume V/R₀³", yscale="log")
-    left.grid(color="0.9", linewidth=0.6)
-    plots.draw_legend(left, loc="center right")
     last = next(k for k, eq in enumerate(there) if eq.volume > 10)
+    volumes, label = [eq.volume for eq in there], "turned"
+    for part in (slice(0, last), slice(last, None)):
+        left.plot(angles[part], volumes[part], "o-", ms=4, color=plots.BOTH.color, label=label)
+        label = None
+    left.plot([limit, angles[last]], [volumes[last]] * 2, color=plots.BOTH.color)
+    snap = {"arrowstyle": "-|>", "color": "#a01040", "linewidth": 1.6, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0}
+    left.annotate("", (limit, volumes[last]), (limit, volumes[last - 1]), arrowprops=snap)
+    left.plot([], [], color=snap["color"], label="snap")
+    left.plot(angles, [eq.volume for eq in back], "--", color=plots.VOLUME_ONLY.color, label="turned back")
+    left.set(
+        xlabel="angle of the magnet in degrees",
+        ylabel="volume V/R₀³",
+        yscale="log",
+        yticks=(ticks := (2, 5, 10, 20, 50)),
+        yticklabels=ticks,
+    )
+    left.minorticks_off()
+    left.grid(color="0.9", linewidth=0.6)
+    plots.draw_legend(left, loc="center left")
     for eq, style in ((there[last - 1], plots.BOTH), (there[last], plots.VOLUME_ONLY)):
         plots.draw_profile(right, eq, style)
     plots.draw_surroundings(right, [there[last]])

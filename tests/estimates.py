@@ -21,10 +21,11 @@ import numpy as np
 import femmembrane as fm
 from femmembrane.accuracy.adapt import trial_mesh
 from femmembrane.accuracy.place_estimate import estimate_place_in
+from femmembrane.discretization.space import transferred
 from femmembrane.potential import potential_of
 from femmembrane.results.equilibrium import recorded
 from femmembrane.solve.controls import CONTROLS
-from femmembrane.solve.finer_space import solved_in, transferred
+from femmembrane.solve.finer_space import solved_in
 from femmembrane.solve.state import distance
 from tests import population
 

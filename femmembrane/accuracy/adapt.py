@@ -23,17 +23,14 @@ from numpy.typing import ArrayLike
 
 from ..discretization.curve import Curve
 from ..discretization.meridian import Accuracy, Asked, Meridian, by_quantity, in_words
-from ..discretization.space import Space, space_of
-from ..errors import InputError, SolveError, Status
-from ..potential import Array, Potential, potential_of
+from ..discretization.space import Space, space_of, transferred
+from ..errors import SolveError, Status
+from ..potential import Array, potential_of
 from ..results.equilibrium import Equilibrium
 from ..results.other_mesh import found_on, state_of
 from ..scene import MAX_DEGREE, Scene
-from ..solve.controls import CONTROLS, Control
-from ..solve.finer_space import solved_in, transferred
-from ..solve.state import State
-from ..solve.wellposed import ill_posed
-from .borders import holding, put_on_borders
+from ..solve.controls import CONTROLS
+from ..solve.finer_space import solved_in
 from .yardstick import Yardstick, accuracy_of, can_hold, controls_of, error_across, relative_error, spread, yardstick_of
 
 if TYPE_CHECKING:
@@ -116,7 +113,7 @@ class Choice:
         self.target = share * tightest
         self.hardest = np.argsort(trial.errors)[::-1]
         self.density = trial.density()
-        most = _WRINKLED_DEGREE if trial.wrinkled and not scene.follow_zones else MAX_DEGREE
+        most = _WRINKLED_DEGREE if trial.wrinkled and not scene.follow_borders else MAX_DEGREE
         self.degree = int(np.clip(round(1 - np.log10(tightest) / 2), 2, most))
 
     def candidate(self, elements: int, degree: int) -> Scene:
@@ -212,7 +209,8 @@ class Trial:
         total = np.zeros_like(s)
         weights = np.maximum(self.errors, 1e-14) ** (1 / (2 * _TRIAL_DEGREE))
         for eq, weight in zip(self.states, weights, strict=True):
-            state, space = eq.of_branch.state, eq.of_branch.potential.space
+            own = eq.of_branch.potential
+            state, space = own.carried(eq.of_branch.state), own.root.space
             centres = (space.ends[1:] + space.ends[:-1]) / 2
             density = np.maximum(_misses(space, state) / space.sizes, 1e-300) ** (1 / (2 * _GRADING_DEGREE + 1))
             if (contact := eq.of_branch.contact) is not None:
@@ -237,11 +235,8 @@ class Trial:
             held = kind.at(kind.value(eq.potential.space, eq.state, eq.pressure, eq.volume))
             result = solved_in(potential, held, eq.potential, eq.state, eq.pressure, damped=True)
             if result.status is Status.CONVERGED:
-                state = _followed(potential, here, State.of(result), held)
-                if state is None:
-                    continue
-                own = state.evaluation
-                error = relative_error(own.potential, own.x, state.pressure, self.controls, self.yardstick)
+                own = result.evaluation
+                error = relative_error(own.potential, own.x, result.pressure, self.controls, self.yardstick)
                 return error if np.isfinite(error) else np.inf
         return self._met(here, eq) if len(self.controls) > 1 else np.inf
 
@@ -250,16 +245,6 @@ class Trial:
         met = found_on(scene, eq.potential, state_of(eq))
         error = np.nan if met is None else error_across(met.potential, state_of(met), self.yardstick.pressure)
         return error if np.isfinite(error) else np.inf
-
-
-def _followed(potential: Potential, scene: Scene, state: State, held: Control) -> State | None:
-    """The state with elements that follow its zones where the scene wants that; None where it is lost."""
-    if not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
-        return state
-    try:
-        return put_on_borders(scene, scene, state, holding(held)).state
-    except (InputError, SolveError):  # as on too few elements
-        return None
 
 
 def trial_of(scene: Scene, follow: Follow, control: str) -> Trial:
@@ -296,7 +281,7 @@ def estimated_trial(
     known = np.isfinite(errors)
     states = [eq for eq, k in zip(equilibria, known, strict=True) if k]
     wrinkled = any(eq.scene.tension_field and (eq.potential.evaluate(eq.state, eq.pressure).stress <= 0).any() for eq in states)
-    return Trial(equilibria[0].of_branch.potential.space, states, controls, errors[known], elements, wrinkled, yardstick)
+    return Trial(equilibria[0].of_branch.potential.root.space, states, controls, errors[known], elements, wrinkled, yardstick)
 
 
 def trial_mesh(mesh: Meridian, elements: int) -> Meridian:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..discretization.space import transferred
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..results.contact import contact_of
@@ -20,7 +21,7 @@ from ..results.verdict import Verdict
 from ..scene import MAX_DEGREE, Scene
 from ..solve.banded import negative_among
 from ..solve.controls import CONTROLS, control_kind
-from ..solve.finer_space import FAR, finer_scene, moved, solved_in, solved_past_folds, transferred
+from ..solve.finer_space import FAR, finer_scene, moved, solved_in, solved_past_folds
 from ..solve.newton import NewtonResult
 from ..solve.state import State, displacement, distance
 from ..solve.state_resolution import unresolved

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..discretization.space import transferred
 from ..errors import Status
 from ..potential import Array, Potential, potential_of
 from ..results.error_estimate import PlaceEstimate, place_from_numbers
@@ -19,7 +20,6 @@ from ..scene import Scene
 from ..solve.banded import BorderedFactor
 from ..solve.branch import BranchProblem, corrected, tangent_at, unit_point
 from ..solve.continuation import BranchPoint
-from ..solve.finer_space import transferred
 from ..solve.newton import NewtonResult
 from ..solve.state import State, joined
 from ..solve.wellposed import ill_posed

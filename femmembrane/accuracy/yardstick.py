@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..discretization.meridian import Accuracy, Asked
+from ..discretization.space import transferred
 from ..errors import Status
 from ..potential import Array, Evaluation, Potential, potential_of
 from ..results.equilibrium import Equilibrium
 from ..scene import Scene
 from ..solve.branch import first_point
-from ..solve.finer_space import met_across, moved, transferred
+from ..solve.finer_space import met_across, moved
 from ..solve.newton import NewtonResult
 from ..solve.state import State
 from ..solve.wellposed import ill_posed, stress_scale

@@ -8,7 +8,6 @@ of the numbers (Fedorov 1972). Points are added one by one where they gain most,
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,13 +70,6 @@ def choose(rows: Array, count: int, known: Array | None = None, most: int | None
         if not moved:
             break
     return chosen
-
-
-def relative_errors(rows: Array, chosen: Sequence[int], known: Array | None = None) -> Array:
-    """Relative standard errors of the numbers by measurements of these candidates; infinite where nothing depends on a number."""
-    J = rows[list(chosen)]
-    information = J.T @ J + (0.0 if known is None else known)
-    return errors_of(information)
 
 
 def errors_of(information: Array) -> Array:

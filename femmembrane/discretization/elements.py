@@ -61,8 +61,10 @@ def _tabulated(degree: int, xi: Array) -> tuple[Array, Array]:
 def _summed(degree: int, xi: Array) -> tuple[Array, Array]:
     """The same at many points, as sums of Legendre polynomials."""
     legendre = np.polynomial.legendre.legvander(2 * xi - 1, degree)
-    value, slope = _series(degree)
-    return legendre @ value, legendre @ slope
+    value, slope = (legendre @ series for series in _series(degree))
+    for end, own in ((0.0, 0), (1.0, -1)):  # an end is where its own node is, to the bit: a pole lies on the axis
+        value[xi == end] = np.eye(degree + 1)[own]
+    return value, slope
 
 
 @lru_cache(maxsize=64)

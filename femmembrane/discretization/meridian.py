@@ -346,27 +346,6 @@ def like(ends: Sequence[float], elements: int) -> Array:
     return np.interp(np.linspace(0, n, elements + 1), np.arange(n + 1), ends)
 
 
-def on_borders(mesh: Any, places: Array, fixed: Sequence[float] = ()) -> Any:
-    """A mesh with ends of elements moved to places along it, and the others carried along with them.
-
-    Parameters
-    ----------
-    mesh : Meridian
-    places : ndarray
-        Increasing, between its first end and its last.
-    fixed : sequence of float
-        Ends that have to stay.
-
-    Raises
-    ------
-    InputError
-        For more places than there are ends to move.
-    """
-    ends = mesh.breakpoints()
-    moved = through(ends, places, fixed)
-    return mesh if moved is ends else on_own_ends(mesh, moved)
-
-
 def on_own_ends(mesh: Any, ends: Array) -> Any:
     """A mesh with other ends, chosen for the accuracy that it was chosen for itself.
 
@@ -378,26 +357,31 @@ def on_own_ends(mesh: Any, ends: Array) -> Any:
     return mesh.on_ends(ends, getattr(mesh, "accuracy", None), getattr(mesh, "estimated", None))
 
 
-def through(ends: Array, places: Array, fixed: Sequence[float] = ()) -> Array:
-    """Ends of as many elements with some of them at given places: those that lie nearest, counted in elements. What is between two places
-    is divided as before."""
-    near = LEAST_LENGTH * (ends[-1] - ends[0])
-    held = [k for k, end in enumerate(ends) if k in (0, ends.size - 1) or any(abs(end - s) <= near for s in fixed)]
-    free = [float(s) for s in places if all(abs(s - ends[k]) > near for k in held) and all(abs(s - f) > near for f in fixed)]
-    if not free:
-        return ends
-    pairs = [(k, float(ends[k])) for k in held]
-    for first, last in pairwise(held):
-        between = [s for s in free if ends[first] < s < ends[last]]
-        count = np.interp(between, ends, np.arange(ends.size))
+def assigned_ends(ends: Array, places: Array, stay: Sequence[int] = ()) -> tuple[tuple[int, float], ...]:
+    """Ends of elements, by number, for places between them: those that lie nearest, counted in elements.
+
+    Parameters
+    ----------
+    ends, places : ndarray
+        Increasing.
+    stay : sequence of int
+        Ends that have to stay, beside the first and the last.
+
+    Raises
+    ------
+    InputError
+        For more places than there are ends to move.
+    """
+    pairs: list[tuple[int, float]] = []
+    for first, last in pairwise(sorted({0, ends.size - 1, *stay})):
+        between = [float(s) for s in places if ends[first] < s < ends[last]]
         if len(between) > last - first - 1:
             allowed = f"more are needed: the membrane has {len(between) + 1} zones where this mesh has {last - first} elements"
             raise InputError("mesh.elements", ends.size - 1, allowed)
-        pairs += zip(_nearest(count, first + 1, last - 1), between, strict=True)
-    index, at = zip(*sorted(pairs), strict=True)
-    moved = np.interp(np.arange(ends.size), index, at)
-    moved[list(index)] = at
-    return moved
+        if between:
+            count = np.interp(between, ends, np.arange(ends.size))
+            pairs += zip(_nearest(count, first + 1, last - 1), between, strict=True)
+    return tuple(pairs)
 
 
 def _nearest(count: Array, first: int, last: int) -> list[int]:

@@ -90,23 +90,40 @@ class Space(Numbering):
         self._known_ends: dict[int, tuple[int, int, float, float]] = {}
         self._gather_two = np.concatenate([self._gather_flat, self._gather_flat + self.n_free + 1])
 
-    def with_moved(self, places: tuple[tuple[int, float], ...]) -> Space:
-        """The same space with some ends of elements at other places along the meridian: the numbering stays.
+    def with_moved(self, places: tuple[tuple[int, float], ...], *, alone: bool = False) -> Space:
+        """The same space with some ends of elements at other places along the meridian, and those between carried along.
+
+        The numbering stays. Ends that are not :attr:`movable` stay as well.
 
         Parameters
         ----------
         places : tuple of (int, float)
             Numbers of ends and their places.
+        alone : bool
+            Whether all others stay, as nodes do that a body holds one by one.
         """
         moved: Space = copy.copy(self)
         for name in [name for name in vars(moved) if isinstance(getattr(type(moved), name, None), cached_property)]:
             del moved.__dict__[name]
-        ends = self.ends.copy()
-        for k, s in places:
-            ends[k] = s
+        known = dict(enumerate(self.ends.tolist()))
+        index = [*range(self.ends.size)] if alone else sorted({k for k, _ in places}.union(np.flatnonzero(~self.movable).tolist()))
+        known.update(places)
+        at = np.array([known[k] for k in index])
+        ends = np.interp(self.ends, self.ends[index], at)
+        ends[index] = at
         moved._place(ends)
         moved._known_ends = {}
         return moved
+
+    @cached_property
+    def movable(self) -> NDArray[np.bool_]:
+        """Which ends of elements can be moved: inside the meridian, and where it is smooth."""
+        found = np.zeros(self.n_elements + 1, dtype=bool)
+        if self.n_elements > 1:
+            kinks = self.ends_of_elements[3][: self.n_elements - 1]
+            found[1:-1] = kinks < 1e-6
+            found[self.breaks] = False
+        return found
 
     def shape_functions(self, xi: Array) -> tuple[Array, Array]:
         """Values and slopes of the shape functions at points xi of the reference element, each of shape (len(xi), degree + 1)."""
@@ -396,6 +413,13 @@ class Space(Numbering):
         return u_s, w_s
 
 
+def transferred(space: Space, x: Array, onto: Space) -> Array:
+    """Free coefficients in another space of the interpolant of the displacement with free coefficients x."""
+    points = onto.interpolation_points()
+    u, _, w, _ = space.evaluate(x, points.ravel())
+    return onto.interpolate(u.reshape(points.shape), w.reshape(points.shape))
+
+
 @lru_cache(maxsize=32)
 def space_of(
     mesh: Meridian,
@@ -409,11 +433,16 @@ def space_of(
     return Space(mesh, degree, anchored=anchored, ends=ends, prestretch=prestretch, nodal=nodal)
 
 
+@lru_cache(maxsize=8)
+def looked_at(mesh: Meridian, degree: int, anchored: frozenset[str], ends: tuple[float, ...], prestretch: float, nodal: bool) -> Space:
+    """The space whose points are both ends of each element, built once."""
+    return Space(mesh, degree, 0, anchored, ends, prestretch, nodal)
+
+
 def space_of_scene(scene: Any) -> Space:
     """The space of a scene, built once."""
-    return moved_space_of(
-        scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, scene.borders, bool(scene.bodies)
-    )
+    borders = scene.borders, scene.follows, bool(scene.bodies)
+    return moved_space_of(scene.mesh, scene.degree, anchored(scene), scene.element_ends, scene.prestretch, *borders)
 
 
 @lru_cache(maxsize=32)
@@ -425,10 +454,11 @@ def moved_space_of(
     prestretch: float,
     borders: tuple[tuple[int, float], ...],
     nodal: bool,
+    alone: bool,
 ) -> Space:
     """The space of a mesh and a degree with some ends of elements elsewhere, see :meth:`Space.with_moved`."""
     space = space_of(mesh, degree, anchored, ends, prestretch, nodal)
-    return space.with_moved(borders) if borders else space
+    return space.with_moved(borders, alone=alone) if borders else space
 
 
 def anchored(scene: Any) -> frozenset[str]:

@@ -21,7 +21,6 @@ from .family import Family as Family
 from .family import FoldDerivatives as FoldDerivatives
 from .numbered import NumberDerivatives as NumberDerivatives
 from .numbered import Numbered as Numbered
-from .numbered import NumberedMember as NumberedMember
 from .of_scene import potential_of as potential_of
 from .potential import Potential as Potential
 from .strain_energy import StrainEnergy as StrainEnergy

@@ -20,12 +20,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Self, cast
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..kernels import kernels
 from ..kernels.bordered import BorderedFactor, SpringFactor
@@ -34,11 +33,10 @@ from ..physics.loads import over_projection
 from ..physics.obstacles import ROUND_OFF, Straight
 from ..threads import cached_property
 from .evaluation import Evaluation
-from .of_scene import potential_of
+from .following import FollowingPotential, Mask
 from .potential import Potential
 
 if TYPE_CHECKING:
-    from ..discretization.space import Space
     from ..physics.obstacles import Obstacle
     from ..scene import Scene
 
@@ -51,11 +49,6 @@ ACROSS = 1e-6
 
 #: keeps the distance from a centre differentiable
 _TINY = 1e-300
-#: potentials on moved meshes that are kept
-_KEPT = 8
-
-Mask = NDArray[np.bool_]
-Borders = tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -216,17 +209,9 @@ class ContactEvaluation(Evaluation):
             self._band = self.reduction.band(band, kd)
         return self._band
 
-    def carried(self, v: Array) -> Array:
-        return cast(ContactPotential, self.potential).carried(v)
-
     def brought(self, v: Array) -> Array:
-        potential, n = cast(ContactPotential, self.potential), self.potential.space.n_free
-        own = potential.from_root @ v[:n] if potential.borders else v[:n]
-        return np.concatenate([self.reduction.projected(own), v[n:]])
-
-    def row(self, row: Array) -> Array:
-        potential = cast(ContactPotential, self.potential)
-        return np.asarray(row @ potential.to_root) if potential.borders else row
+        n, own = self.potential.space.n_free, self.potential.brought(v)
+        return np.concatenate([self.reduction.projected(own[:n]), own[n:]])
 
     def pressed_flat(self) -> Mask | None:
         potential = cast(ContactPotential, self.potential)
@@ -282,25 +267,12 @@ class ContactEvaluation(Evaluation):
         return border, dx, dp, largest(dx), largest(self.x)
 
 
-class ContactPotential(Potential):
+class ContactPotential(FollowingPotential):
     """The potential of a scene with obstacles. Which nodes are held in a state follows from the state itself."""
 
-    def __init__(self, scene: Scene, quadrature: int | None = None, root: ContactPotential | None = None) -> None:
-        self._root = root
-        if scene.borders:
-            self._root = self._like = root or cast(ContactPotential, potential_of(scene.bordered(())))
-        super().__init__(scene, quadrature)
+    def __init__(self, scene: Scene, quadrature: int | None = None, root: Self | None = None) -> None:
+        super().__init__(scene, quadrature, root)
         self.obstacles = scene.bodies
-        self._moved: dict[Borders, ContactPotential] = {}
-
-    @property
-    def root(self) -> ContactPotential:
-        return self._root or self
-
-    @property
-    def unsettled(self) -> bool:  # type: ignore[override]  # read only here, and there
-        """Whether the set of held nodes is still to be found by a corrector."""
-        return True
 
     @cached_property
     def without_bodies(self) -> Potential:
@@ -309,27 +281,6 @@ class ContactPotential(Potential):
         bare.__dict__.update(self.root.__dict__, obstacles=())
         return bare
 
-    @property
-    def borders(self) -> Borders:  # type: ignore[override]  # read only here, and there
-        """Ends of elements that stand at borders of contact, and their places."""
-        return self.scene.borders
-
-    def bordered(self, borders: Borders) -> ContactPotential:
-        """The potential on the mesh that has ends of elements at borders of contact. The last ones are kept."""
-        root = self.root
-        if not borders:
-            return root
-        known = root._moved.pop(borders, None)
-        if known is None:
-            known = root._on(borders)
-        root._moved[borders] = known
-        if len(root._moved) > _KEPT:
-            root._moved.pop(next(iter(root._moved)), None)
-        return known
-
-    def _on(self, borders: Borders) -> ContactPotential:
-        return ContactPotential(self.scene.bordered(borders), root=self)
-
     def bodies_at(self, factor: float) -> tuple[Obstacle, ...]:
         """The bodies. ``factor`` as in :meth:`evaluate`: in a family of scenes it may be a number of theirs."""
         return self.obstacles
@@ -337,27 +288,6 @@ class ContactPotential(Potential):
     def edge_load(self, evaluation: Evaluation, eta: float) -> float:
         """What loads over the projected area have, per area, at a height."""
         return evaluation.factor * float(over_projection(self.loads, np.array(eta))[0]) if self.loads else 0.0
-
-    @cached_property
-    def to_root(self) -> sparse.csr_matrix:
-        """The map from coefficients here to those on the mesh of the scene, by interpolation."""
-        return _interpolation(self.space, self.root.space)
-
-    @cached_property
-    def from_root(self) -> sparse.csr_matrix:
-        """The map from coefficients on the mesh of the scene to those here, by interpolation."""
-        return _interpolation(self.root.space, self.space)
-
-    @cached_property
-    def movable(self) -> Mask:
-        """Which ends of elements can be moved: inside the meridian, and where it is smooth."""
-        space, ends = self.root.space, self.root.space.ends
-        found = np.zeros(ends.size, dtype=bool)
-        if space.n_elements > 1:
-            kinks = space.ends_of_elements[3][: space.n_elements - 1]
-            found[1:-1] = kinks < 1e-6
-            found[space.breaks] = False
-        return found
 
     @cached_property
     def nodes(self) -> NDArray[np.int64]:
@@ -485,10 +415,6 @@ class ContactPotential(Potential):
         """The smooth potential on a set of held nodes."""
         return Held(self, held)
 
-    def carried(self, v: Array) -> Array:
-        """A displacement here in the coefficients on the mesh of the scene."""
-        return np.asarray(self.to_root @ v) if self.borders else v
-
     @property
     def given(self) -> float:
         """The third argument of :meth:`evaluate` for the scene itself."""
@@ -576,24 +502,3 @@ def _gap_expression(potential: ContactPotential, rho: ca.SX, eta: ca.SX) -> ca.S
     for gap in gaps[1:]:
         least = ca.fmin(least, gap)
     return least
-
-
-def _interpolation(space: Space, onto: Space) -> sparse.csr_matrix:
-    """The map between coefficients of two spaces with the same numbering, whose coefficients are values at their nodes."""
-    n, s = space.n_free, onto.node_parameters()
-    element, xi = space.locate(s)
-    value = space.shape_functions(xi)[0]
-    n_local = space.degree + 1
-    target = onto.numbers[onto.nodes]
-    if onto.closed:
-        s, element, value, target = s[:-1], element[:-1], value[:-1], target[:-1]
-    rows, columns, entries = [], [], []
-    for field in (0, 1):
-        source = space.gather[field * n_local : (field + 1) * n_local, element].T
-        row = np.broadcast_to(target[: len(source), field][:, None], source.shape)
-        keep = (row < n) & (source < n) & (value != 0)
-        rows.append(row[keep])
-        columns.append(source[keep])
-        entries.append(value[keep])
-    shape = n, n
-    return sparse.csr_matrix((np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

@@ -21,9 +21,10 @@ from ..kernels.interface import Array
 from ..physics.loads import over_projection
 from ..physics.obstacles import Obstacle, rows_of
 from ..scene.variation import Parameter
-from .contact import ACROSS, Borders, ContactEvaluation, ContactPotential, Held, Mask
+from .contact import ACROSS, ContactEvaluation, ContactPotential, Held
 from .evaluation import Evaluation
 from .family import Family, FoldDerivatives
+from .following import Borders, Mask
 from .of_scene import potential_of
 from .potential import Potential
 
@@ -53,7 +54,7 @@ class ContactFamily(ContactPotential, Family):
     """
 
     def __init__(self, parameter: Parameter, root: ContactFamily | None = None, borders: Borders = ()) -> None:
-        self._root = self._like = root
+        self._root = self._like = root  # type: ignore[assignment]  # of this class
         self.parameter, self._here = parameter, borders
 
         def vary(number: Any) -> SimpleNamespace:
@@ -74,7 +75,7 @@ class ContactFamily(ContactPotential, Family):
     def given(self) -> float:
         return self.parameter.value
 
-    def _on(self, borders: Borders) -> ContactFamily:
+    def _on(self, borders: Borders) -> ContactFamily:  # type: ignore[override]  # the one of its kind
         return ContactFamily(self.parameter, self, borders)
 
     def holding(self, held: Mask) -> HeldFamily:

@@ -110,16 +110,16 @@ class Evaluation:
         return self
 
     def carried(self, v: Array) -> Array:
-        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders of contact."""
-        return v
+        """See :meth:`.Potential.carried`."""
+        return self.potential.carried(v)
 
     def brought(self, v: Array) -> Array:
-        """A displacement on the mesh of the scene here, with what may stand behind it."""
-        return v
+        """See :meth:`.Potential.brought`; without what bodies keep from moving."""
+        return self.potential.brought(v)
 
     def row(self, row: Array) -> Array:
-        """A linear form of :meth:`carried` displacements as one of displacements here."""
-        return row
+        """See :meth:`.Potential.row`."""
+        return self.potential.row(row)
 
     def pressed_flat(self) -> NDArray[np.bool_] | None:
         """Which elements lie on a body all over, shape (n_elements,), so that no short wave lifts them; None where none does."""

@@ -106,16 +106,6 @@ class Numbered(Potential):
         k = self._mover
         return 0.0 if self._way is None or k is None else self._way.unit.axial[0] * (values[k] - self._way.at)
 
-    def lift_at(self, s: Array, values: Sequence[float]) -> tuple[Array, Array, int] | None:
-        """(u, u_s, w, w_s) at parameters s that the number which moves an end adds to those of the space; their rates, shape (4, n), and
-        which number that is. None without one.
-        """
-        k = self._mover
-        if self._way is None or k is None:
-            return None
-        unit = self._way.unit.at(self.space.mesh, s)
-        return (values[k] - self._way.at) * unit, unit, k
-
     @cached_property
     def _mover(self) -> int | None:
         """Which number moves an end of the membrane; None where none does."""

@@ -32,7 +32,12 @@ def _plain(scene: Scene) -> Scene:
         electric = scene.electric.plain(scene.scales)
     ratio = scene.radius_to_thickness if scene.bending else 1.0  # no equilibrium knows it
     plain = {"radius_to_thickness": ratio, "scales": None, "electric": electric}
-    return scene.replace(title="", follow_zones=False, run=None, analysis=type(scene.analysis)(), **plain)
+    return scene.replace(title="", follow_borders=_following(scene), run=None, analysis=type(scene.analysis)(), **plain)
+
+
+def _following(scene: Scene) -> bool | None:
+    """What decides whether elements follow borders: nothing where there are none."""
+    return False if scene.bodies and scene.follow_borders is False else (scene.follows_zones or None)
 
 
 def require_elements(scene: Scene) -> None:
@@ -44,8 +49,9 @@ def require_elements(scene: Scene) -> None:
 
 @lru_cache(maxsize=64)
 def _potential_of(scene: Scene) -> Potential:
-    if not scene.bodies:
+    if not scene.follows:
         return Potential(scene)
     from .contact import ContactPotential
+    from .following import WrinklingPotential
 
-    return ContactPotential(scene)
+    return ContactPotential(scene) if scene.bodies else WrinklingPotential(scene)

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..discretization.lift import Moving
-from ..discretization.space import HESSIAN_PAIRS, Space, anchored, space_of
+from ..discretization.space import HESSIAN_PAIRS, Space, anchored, looked_at, space_of
 from ..errors import InputError
 from ..kernels import kernels
 from ..kernels.interface import Array, Elements
@@ -58,10 +58,11 @@ class Potential(PointTerms):
         Whether the membrane without load is flat and without stress, so that nothing but a load gives it stiffness across its plane.
     """
 
-    #: rigid bodies that the membrane may touch, and whether a corrector has still to find which nodes they hold
+    #: rigid bodies that the membrane may touch
     obstacles: tuple[Obstacle, ...] = ()
-    unsettled = False
-    #: ends of elements that stand at borders of contact, and their places
+    #: whether ends of elements follow the borders of a state, and whether a corrector has still to find these, and which nodes are held
+    follows = unsettled = False
+    #: ends of elements that stand at borders, and their places
     borders: tuple[tuple[int, float], ...] = ()
     #: a potential with the same expressions on other points
     _like: Potential | None = None
@@ -72,14 +73,16 @@ class Potential(PointTerms):
     def __init__(self, scene: Scene, quadrature: int | None = None) -> None:
         self.scene = scene
         fixed = anchored(scene)
-        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "bodies", ()))
+        ends, stretch, nodal = scene.element_ends, scene.prestretch, bool(getattr(scene, "follows", False))
         self.space = (
             space_of(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
             if quadrature is None
+            else looked_at(scene.mesh, scene.degree, fixed, ends, stretch, nodal)
+            if quadrature == 0
             else Space(scene.mesh, scene.degree, quadrature, fixed, ends, stretch, nodal)
         )
         if borders := getattr(scene, "borders", ()):
-            self.space = self.space.with_moved(borders)
+            self.space = self.space.with_moved(borders, alone=bool(scene.bodies))
         space = self.space
         self.sheet = Sheet.of(scene)
         if not space.n_free:
@@ -131,6 +134,18 @@ class Potential(PointTerms):
         """A state with the nodes that bodies hold moved onto them. ``factor`` as in :meth:`evaluate`."""
         return x
 
+    def carried(self, v: Array) -> Array:
+        """A displacement in the coefficients on the mesh of the scene: the same one, unless ends of elements follow borders."""
+        return v
+
+    def brought(self, v: Array) -> Array:
+        """A displacement on the mesh of the scene here, with what may stand behind it."""
+        return v
+
+    def row(self, row: Array) -> Array:
+        """A linear form of :meth:`carried` displacements as one of displacements here."""
+        return row
+
     def by_itself(self, factor: float) -> tuple[Potential, float]:
         """The potential that a minimiser takes, and its factor: this one, but for a family whose constraints change with its number."""
         return self, factor
@@ -141,7 +156,7 @@ class Potential(PointTerms):
 
     @property
     def root(self) -> Potential:
-        """The potential on the mesh of the scene: this one, unless ends of elements follow borders of contact."""
+        """The potential on the mesh of the scene: this one, unless ends of elements follow borders."""
         return self
 
     @cached_property

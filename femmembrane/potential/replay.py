@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -33,7 +34,7 @@ class PointProgram:
 
     @cached_property
     def _replay(self) -> Replay:
-        return Replay(self.function, self.data)
+        return Replay(self.function, self.data, None if self._like is None else self._like._replay)
 
     def replay(self, local: Array, parameters: Array) -> Array:
         """Values at all points, shape (rows, n)."""
@@ -50,17 +51,19 @@ class PointProgram:
 
 
 class Replay:
-    """A point function replayed on vectors of points, called through preallocated buffers."""
+    """A point function replayed on vectors of points, called through preallocated buffers.
+
+    ``like`` is one of the same function on as many other points, whose instructions it shares.
+    """
 
     @BUILDING
-    def __init__(self, function: ca.Function, data: Array) -> None:
+    def __init__(self, function: ca.Function, data: Array, like: Replay | None = None) -> None:
         n, self.function = data.shape[1], function
         self.block = min(n, _BLOCK)
         self.n_blocks = -(-n // self.block)
         self.n, self.rows = n, function.numel_out(0)
-        vector = vectorise(function, self.block)
-        if self.n_blocks > 1:
-            vector = vector.map("blocks", "serial", self.n_blocks, [2], [])
+        vector: Any = self._vectorised() if like is None else like._vector
+        self._vector: Any = vector
         self._data = self._split(data)
         self._local = np.ones((self.n_blocks, function.numel_in(1), self.block))
         self._parameters = np.zeros(function.numel_in(2))
@@ -70,6 +73,10 @@ class Replay:
         for k, array in enumerate((self._data, self._local, self._parameters)):
             self._buffer.set_arg(k, memoryview(array))  # type: ignore[arg-type, call-arg]
         self._buffer.set_res(0, memoryview(self._out))  # type: ignore[arg-type, call-arg]
+
+    def _vectorised(self) -> ca.Function:
+        vector = vectorise(self.function, self.block)
+        return vector if self.n_blocks == 1 else vector.map("blocks", "serial", self.n_blocks, [2], [])
 
     def _split(self, rows: Array) -> Array:
         """(rows, n) -> (n_blocks, rows, block), the last block filled up with its own last point."""

@@ -32,7 +32,7 @@ def state_at(branch: Branch, places: Mapping[str, float | None], refine: bool, c
     _of_one_scene(branch)
     quantity, value = only("at", places, "exactly one of volume, pressure and center_height is allowed")
     value, crossing, refine = number(quantity, value), whole("crossing", crossing, least=-MOST_CROSSINGS), switch("refine", refine)
-    refine = refine or bool(branch.scene.bodies)  # the nodes that a body holds are not those between two states
+    refine = refine or branch.scene.follows  # elements, and the nodes that a body holds, are not those between two states
     curve = branch.curve
     found = list(curve.crossings(quantity, value))
     if not found:
@@ -100,7 +100,7 @@ def _held(piece: Piece, share: float, quantity: str, value: float) -> Equilibriu
 def _solved(piece: Piece, state: State) -> Equilibrium:
     own = state.evaluation
     scene, potential = piece.a.equilibrium.scene, piece.a.equilibrium.potential
-    if potential.obstacles:
+    if potential.follows:
         scene, potential = scene.bordered(own.potential.scene.borders), own.potential
     return recorded(scene, potential, own.x, state.pressure, own, Status.CONVERGED, state.residual, state.iterations)
 
@@ -109,7 +109,7 @@ def _solved(piece: Piece, state: State) -> Equilibrium:
 def resampled(branch: Branch, count: int, refine: bool) -> Branch:
     """See :meth:`.Branch.resample`."""
     _of_one_scene(branch)
-    count, refine = whole("count", count, least=2), switch("refine", refine) or bool(branch.scene.bodies)
+    count, refine = whole("count", count, least=2), switch("refine", refine) or branch.scene.follows
     runs = [run for run in branch.curve.runs if run]
     if len(runs) < len(branch.curve.runs) or count < 2 * len(runs):
         raise InputError("count", count, f"two for each part of the branch between snaps are needed, {2 * max(len(runs), 1)} or more")

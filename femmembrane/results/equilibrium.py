@@ -72,7 +72,7 @@ class Equilibrium:
     electric_energy : float
         Energy of a voltage (with what its source gives) or of a charge, in the same units; 0 without.
     on_branch : Equilibrium or None
-        Of a run whose elements follow the zones: the state on the mesh of the branch that was put on its own. None for any other.
+        Of a run over a number whose elements follow zones: the state on the mesh of the branch that was put on its own. None for any other.
 
     Examples
     --------
@@ -256,8 +256,6 @@ class Equilibrium:
             Default: the nodes.
         """
         space = self.potential.space
-        if r is None:
-            space = self.potential.root.space
         return space.node_parameters() if r is None else _places(r, space.ends, "reference radii" if space.radial else "arc lengths")
 
     def verdict(
@@ -379,8 +377,8 @@ class Equilibrium:
 
         A border of a zone inside an element costs digits at any degree. The ends of elements nearest to the borders are moved there, as
         many elements as before, and the equilibrium is corrected at the same load until both are at rest. Errors then fall at order 2 p
-        for elements of degree p, those of the borders as well. ``scene.mesh`` of what is returned has the new ends. Where there is no
-        border it is this equilibrium.
+        for elements of degree p, those of the borders as well. ``scene.borders`` of what is returned has the ends that were moved, and
+        ``scene.follow_borders`` is true. Where there is no border it is this equilibrium.
 
         Parameters
         ----------

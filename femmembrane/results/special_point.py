@@ -13,6 +13,7 @@ from . import door
 from .equilibrium import Equilibrium
 from .error_estimate import PlaceEstimate
 from .postbuckling import Postbuckling, not_an_onset
+from .zones import ZoneChange
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,8 @@ class SpecialPoint:
     ----------
     kind : str
         limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset; over a number of the scene number_fold,
-        where that is stationary.
+        where that is stationary; with bodies in the way touch and release; in a tension field zone_opens and zone_closes, where a zone of
+        wrinkles, or of taut membrane between wrinkles, appears or vanishes.
     volume, pressure, center_height : float
         Of its equilibrium.
     error : float
@@ -38,6 +40,8 @@ class SpecialPoint:
     tangent : ndarray, shape (n_free + 1,), or None
         For a branch point of one scene: the direction in (x, P) of the branch on which it was found. It tells this branch from the
         crossing one.
+    zone : ZoneChange or None
+        Which zone of a tension field opens or closes there, and where along the meridian.
     """
 
     kind: str
@@ -49,6 +53,7 @@ class SpecialPoint:
     azimuthal: int = field(default=0, kw_only=True)
     over: str = field(default="", repr=False, kw_only=True)
     tangent: Array | None = field(default=None, repr=False, kw_only=True)
+    zone: ZoneChange | None = field(default=None, repr=False, kw_only=True)
 
     @property
     def number(self) -> float | None:
@@ -140,6 +145,8 @@ class SpecialPoint:
     def __repr__(self) -> str:
         over = {self.over: self.number} if self.over else {}
         shown = {f.name: getattr(self, f.name) for f in fields(self) if f.repr}
+        if self.zone is not None:
+            shown["zone"] = self.zone
         pairs = {"kind": shown.pop("kind"), **over, **shown}
         return f"SpecialPoint({', '.join(f'{name}={value!r}' for name, value in pairs.items())})"
 

@@ -213,7 +213,7 @@ def _profile_variables(branch: Branch) -> dict[str, Variable]:
     table = columns(branch)  # the largest electric field has the name of the field, of which there is a value at each node as well
     names = {key: f"{key}_profile" if key in table else key for key in profiles[0] if key not in places}
     values = {name: (("step", "node"), stacked(p[key] for p in profiles)) for key, name in names.items()}
-    if branch.mesh_changes or any(e.on_branch is not None for e in branch):  # each equilibrium has its own nodes
+    if branch.mesh_changes or any(e.scene.borders for e in branch):  # each equilibrium has its own nodes
         return {**{key: (("step", "node"), stacked(p[key] for p in profiles)) for key in places}, **values}
     return {**{key: (("node",), np.array(profiles[0][key])) for key in places}, **values}
 

@@ -23,6 +23,7 @@ from .equilibrium import Equilibrium
 from .path_memory import PathMemory, TraceMemory
 from .ragged import row_of, stacked
 from .special_point import Jump, SpecialPoint
+from .zones import ZONE_CHANGES, ZoneChange
 
 if TYPE_CHECKING:
     import xarray
@@ -63,17 +64,18 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
         prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
         prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
         prefix + "state": ((dimension, "coefficient"), stacked([e.state for e in equilibria], width)),
-        **_own_meshes(equilibria, width, dimension, prefix),
+        **_on_branches(equilibria, width, dimension, prefix),
     }
 
 
-def _own_meshes(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str) -> dict[str, Variable]:
-    """Where elements follow zones: the ends of the elements of each equilibrium, and the states on the mesh of the branch."""
+def _on_branches(equilibria: Sequence[Equilibrium], width: int, dimension: str, prefix: str) -> dict[str, Variable]:
+    """The states on the mesh of the branch, of those that were put on borders after it, with their own ends of elements beside bodies."""
     if all(e.on_branch is None for e in equilibria):
         return {}
-    ends = np.array([e.scene.mesh.breakpoints() for e in equilibria])
     states = equilibrium_variables([e.of_branch for e in equilibria], width, dimension, prefix + ON_BRANCH)
-    return {prefix + "element_ends": ((dimension, "element_end"), ends), **states}
+    if all(e.scene.mesh == e.of_branch.scene.mesh for e in equilibria):
+        return states
+    return {prefix + "element_ends": ((dimension, "element_end"), np.array([e.scene.mesh.breakpoints() for e in equilibria])), **states}
 
 
 def mesh_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str = "") -> dict[str, Variable]:
@@ -104,7 +106,7 @@ def _meshed(dataset: xarray.Dataset, scene: Scene, prefix: str) -> list[Scene]:
 
 
 def _border_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str) -> dict[str, Variable]:
-    """Ends of elements at borders of contact, with their places: as many columns as an equilibrium has most."""
+    """Ends of elements at borders, with their places: as many columns as an equilibrium has most."""
     most = max((len(e.scene.borders) for e in equilibria), default=0)
     if not most:
         return {}
@@ -130,18 +132,21 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
     needed = [name for name in _SCALARS if (count and present.get(name, True)) or prefix + name in dataset]
     scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
     scalars.setdefault("magnetic_energy", [0.0] * count)
-    if prefix + "border_end" in dataset:
-        scenes = [scene.bordered(borders) for borders in _borders_of(dataset, prefix)]
     if over:
         scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
     on_branch: list[Equilibrium | None] = [None] * count
-    if prefix + "element_ends" in dataset:  # elements follow zones
-        ends = _finite(dataset, prefix + "element_ends", count, scene.mesh.elements + 1)
-        states_there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
-        for k, own in enumerate(ends):
-            if not np.array_equal(own, scene.mesh.breakpoints()):
-                there = scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, own))
-                on_branch[k], scenes[k] = states_there[k], there.bordered(scenes[k].borders)
+    borders = _borders_of(dataset, prefix) if prefix + "border_end" in dataset else [()] * count
+    if prefix + ON_BRANCH + "state" in dataset:
+        there = equilibria_of(dataset, scene, over, prefix + ON_BRANCH)
+        own_ends = [each.mesh.breakpoints() for each in scenes]
+        if prefix + "element_ends" in dataset:
+            own_ends = list(_finite(dataset, prefix + "element_ends", count, scene.mesh.elements + 1))
+        for k, ends in enumerate(own_ends):
+            if not np.array_equal(ends, scenes[k].mesh.breakpoints()):
+                scenes[k] = scenes[k].replace(mesh=on_own_ends(scenes[k].mesh, ends))
+            if scenes[k].mesh != there[k].scene.mesh or borders[k] != there[k].scene.borders:
+                on_branch[k] = there[k]
+    scenes = [each.bordered(own) for each, own in zip(scenes, borders, strict=True)]
     return [
         Equilibrium(
             **{name: values[k] for name, values in scalars.items()},
@@ -188,7 +193,26 @@ def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str, o
         own[f"{prefix}equilibrium_{over}"] = (dimension,), typed(over, (p.equilibrium.number(over) for p in points))
     if changes:
         own |= mesh_variables([p.equilibrium for p in points], dimension, prefix + "equilibrium_")
-    return {**kinds, **own, **numbers, **tangents, **states}
+    return {**kinds, **own, **numbers, **tangents, **_zone_variables(points, dimension, prefix), **states}
+
+
+def _zone_variables(points: Sequence[SpecialPoint], dimension: str, prefix: str) -> dict[str, Variable]:
+    """Where zones of a tension field open and close."""
+    if not any(p.zone for p in points):
+        return {}
+    zones = [p.zone or ZoneChange("", "", float("nan"), float("nan")) for p in points]
+    return {
+        f"{prefix}changing_zone_{name}": ((dimension,), typed(f"changing_zone_{name}", (getattr(zone, name) for zone in zones)))
+        for name in ZONE_CHANGES
+    }
+
+
+def _zones_of(dataset: xarray.Dataset, prefix: str, count: int) -> list[ZoneChange | None]:
+    if f"{prefix}changing_zone_kind" not in dataset:
+        return [None] * count
+    kinds, places = (map(str, dataset[f"{prefix}changing_zone_{name}"].values) for name in ZONE_CHANGES[:2])
+    radii = (dataset[f"{prefix}changing_zone_{name}"].values.tolist() for name in ZONE_CHANGES[2:])
+    return [ZoneChange(*each) if each[0] else None for each in zip(kinds, places, *radii, strict=True)]
 
 
 def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str) -> tuple[SpecialPoint, ...] | None:
@@ -204,8 +228,8 @@ def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: 
         rows = [np.array(row_of(row)) for row in dataset[prefix + "tangent"].values]
         tangents = [row if row.size == e.state.size + 1 and np.isfinite(row).all() else None for row, e in zip(rows, states, strict=True)]
     return tuple(
-        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, over=over, tangent=t)
-        for k, n, e, t in zip(kinds, numbers, states, tangents, strict=True)
+        SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, over=over, tangent=t, zone=z)
+        for k, n, e, t, z in zip(kinds, numbers, states, tangents, _zones_of(dataset, prefix, len(kinds)), strict=True)
     )
 
 

@@ -15,6 +15,7 @@ from ..errors import unknown_name
 from ..scene.variation import names
 from .analyses import ANALYSES, asked, typed_column
 from .analyses.base import Cell, EquilibriumAnalysis
+from .zones import ZONE_CHANGES
 
 if TYPE_CHECKING:
     import pandas
@@ -113,6 +114,7 @@ def special_point_rows(branch: Branch) -> Iterator[list[Any]]:
     """One row for each special point of the branch, in the order of :func:`special_point_columns`."""
     values = [
         *(partial(_attribute, name=name) for name in _located_by(branch)),
+        *(partial(_zone_attribute, name=name) for name in _zones_changing(branch)),
         *(partial(analysis.point_value, column=name) for analysis, name in _of_points(branch)),
     ]
     for point in branch.special_points or ():
@@ -128,15 +130,25 @@ def _attribute(point: SpecialPoint, name: str) -> Any:
     return point.equilibrium.number(name) if "." in name else getattr(point, name)
 
 
+def _zones_changing(branch: Branch) -> tuple[str, ...]:
+    """What is told of zones that open or close, where some do."""
+    return ZONE_CHANGES if any(point.zone for point in branch.special_points or ()) else ()
+
+
+def _zone_attribute(point: SpecialPoint, name: str) -> Cell:
+    return "" if point.zone is None else getattr(point.zone, name)
+
+
 def _of_points(branch: Branch) -> list[tuple[EquilibriumAnalysis, str]]:
     scene, points = branch.scene, branch.special_points or ()
     return [(each, name) for each in asked(scene) for name in (*each.point_columns(scene), *each.found_columns(points))]
 
 
 def special_point_columns(branch: Branch) -> list[str]:
-    """Columns of ``special_points.csv``: kind, a number that changes along the branch, volume, pressure, center_height, error, and those of
-    the analyses of the scene."""
-    return [*_located_by(branch), *(name for _, name in _of_points(branch))]
+    """Columns of ``special_points.csv``: kind, a number that changes along the branch, volume, pressure, center_height, error, those of
+    zones that open or close, and those of the analyses of the scene."""
+    changing = (f"changing_zone_{name}" for name in _zones_changing(branch))
+    return [*_located_by(branch), *changing, *(name for _, name in _of_points(branch))]
 
 
 def write_special_points_csv(branch: Branch, path: str | PathLike[str]) -> None:

@@ -17,6 +17,8 @@ from . import door
 
 #: kinds of zones; the place of a kind is its number
 KINDS = ("taut", "radial", "circumferential", "double")
+#: what is told of a zone that opens or closes; columns have these names after ``changing_zone_``
+ZONE_CHANGES = ("kind", "place", "reference_radius", "radius")
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,30 @@ class Zones(Sequence[Zone]):
 
     def __str__(self) -> str:
         return "\n".join([f"zones by the signs of the {self.criterion} stresses", *(f"  {zone}" for zone in self)])
+
+
+@dataclass(frozen=True)
+class ZoneChange:
+    """Where along the meridian a zone of a tension field appears or vanishes.
+
+    Attributes
+    ----------
+    kind : {"taut", "radial", "circumferential", "double"}
+        Of the zone. A taut zone that closes lets two zones of wrinkles merge.
+    place : {"pole", "rim", "inside"}
+        At an end of the meridian on the axis, at another end, or between them.
+    reference_radius, radius : float
+        Reference and deformed radius there, over R0.
+    """
+
+    kind: str
+    place: str
+    reference_radius: float
+    radius: float
+
+    def __str__(self) -> str:
+        where = "at the pole" if self.place == "pole" else f"at r = {self.reference_radius:.4g}"
+        return f"{self.kind}, {'at the rim, ' if self.place == 'rim' else ''}{where}"
 
 
 @dataclass(frozen=True, eq=False)

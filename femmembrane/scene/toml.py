@@ -109,7 +109,7 @@ SCENE_KEYS: dict[str, tuple[str, ...]] = {
         *("susceptibility", "radius_to_thickness", "thickness", "modulus", "prestretch"),
         *("saturation", "remanence", "remanence_direction", "remanence_transport"),
     ),
-    "mesh": ("degree", "follow_zones"),
+    "mesh": ("degree", "follow_borders"),
     "effects": ("tension_field", "demagnetization", "bending", "squeezed"),
     "output": ("vtu",),
 }
@@ -230,7 +230,7 @@ def tables_of(scene: Scene, record: bool = False) -> dict[str, Any]:
         "mesh": {
             **_describe("mesh", "shape", SHAPES, scene.mesh, record),
             "degree": scene.degree,
-            **({"follow_zones": True} if scene.follow_zones else {}),
+            **({} if scene.follow_borders is None else {"follow_borders": scene.follow_borders}),
         },
         "run": _arguments(scene.run) if scene.run else {},
         "analysis": {name: value for name, value in _arguments(scene.analysis).items() if value is not False},

@@ -72,9 +72,10 @@ class Scene:
         R0/T > 0; it enters the total stresses, and bending. Left out: the ratio of the scales, or 1000 without scales.
     tension_field : bool
         Whether the membrane wrinkles rather than carry compression (:mod:`~femmembrane.physics.tension_field`).
-    follow_zones : bool
-        Whether ends of elements follow the borders of the zones of a tension field: each equilibrium of a run then has as many elements as
-        the mesh, and ``eq.scene.mesh`` has its own ends (:meth:`.Equilibrium.on_borders`). Without a tension field it does nothing.
+    follow_borders : bool or None
+        Whether ends of elements follow borders, of contact and of the zones of a tension field: each equilibrium then has as many elements
+        as the mesh, some ends of which are at its borders (:attr:`borders`). Left out, those of contact are followed, and those of zones
+        are not, as that takes some twenty times as long. Without contact and tension field it does nothing.
     title : str
         Up to 1000 characters.
     run : Run, optional
@@ -118,7 +119,7 @@ class Scene:
     vtu : bool
         Whether a run writes surfaces for ParaView to its folder, most of what is in it. They change no number.
     borders : tuple of (int, float)
-        Found with an equilibrium in contact, and not to be given: ends of elements that stand at the borders of contact, by their numbers,
+        Found with an equilibrium, and not to be given: ends of elements that stand at borders of contact or of zones, by their numbers,
         with their places along the meridian.
 
     Raises
@@ -147,7 +148,7 @@ class Scene:
     susceptibility: float | None = None
     radius_to_thickness: float = None  # type: ignore[assignment]  # a float as soon as the scene is made
     tension_field: bool = False
-    follow_zones: bool = field(default=False, kw_only=True)
+    follow_borders: bool | None = field(default=None, kw_only=True)
     title: str = ""
     run: Run | None = None
     analysis: Analysis = field(default_factory=Analysis)
@@ -212,7 +213,7 @@ class Scene:
             susceptibility=_susceptibility("membrane.susceptibility", self.susceptibility),
             radius_to_thickness=_ratio("membrane.radius_to_thickness", self.radius_to_thickness, self.scales),
             tension_field=switch("effects.tension_field", self.tension_field),
-            follow_zones=switch("mesh.follow_zones", self.follow_zones),
+            follow_borders=None if self.follow_borders is None else switch("mesh.follow_borders", self.follow_borders),
             title=_text("title", self.title),
             thickness=Along.of("membrane.thickness", self.thickness),
             modulus=Along.of("membrane.modulus", self.modulus),
@@ -339,9 +340,14 @@ class Scene:
         return bool(getattr(self.mesh, "open", False))
 
     @property
+    def follows(self) -> bool:
+        """Whether the scene has borders that ends of elements can follow, of contact or of zones."""
+        return bool(self.bodies) or self.follows_zones
+
+    @property
     def follows_zones(self) -> bool:
-        """Whether there are borders that elements follow."""
-        return self.follow_zones and self.tension_field
+        """Whether elements follow the borders of zones."""
+        return bool(self.follow_borders) and self.tension_field
 
     @property
     def bodies(self) -> tuple[Obstacle, ...]:

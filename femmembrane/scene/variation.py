@@ -466,7 +466,7 @@ def _parts(scene: Scene) -> SimpleNamespace:
     """The parts of a scene that formulas use."""
     kept = (
         *("mesh", "degree", "tension_field", "thickness", "modulus", "prestretch", "element_ends", "material", "sources", "loads"),
-        *("bodies", "borders"),
+        *("bodies", "borders", "follows"),
     )
     found = {name: getattr(scene, name) for name in ("susceptibility", "electricity", *MAGNETISATION, *kept)}
     return SimpleNamespace(**found)

@@ -13,6 +13,7 @@ border, solved by Broyden's method. Its forces converge at twice the order of th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
@@ -23,7 +24,8 @@ from ..potential import Array, Potential
 from .controls import ArcLengthControl, CarriedArcLength, Control
 
 if TYPE_CHECKING:
-    from ..potential.contact import ContactEvaluation, ContactPotential, Mask
+    from ..potential.contact import ContactEvaluation, ContactPotential
+    from ..potential.following import FollowingPotential, Mask
     from .continuation import BranchPoint
     from .newton import NewtonResult
     from .segment import Located, Segment
@@ -77,7 +79,8 @@ def settled(once: Once, control: Control, potential: Potential, x: Array, pressu
     x = np.ascontiguousarray(x, dtype=float)
     root, x = given.root, given.carried(x)
     result = _on_mesh(once, control, root, x, pressure, magnetic)
-    followed = _with_borders(once, control, root, result) if result.status is Status.CONVERGED else None
+    follow = result.status is Status.CONVERGED and root.scene.follow_borders is not False
+    followed = _with_borders(once, control, root, result) if follow else None
     if followed is None:
         return result
     followed.x = followed.evaluation.carried(followed.x)
@@ -119,7 +122,7 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
 def _smoothed(root: ContactPotential, held: Mask, fill: bool) -> Mask:
     """A set without holes shorter than an element, or without zones as short: a guess next to a border may have them from round-off."""
     new, at = held.copy(), np.flatnonzero(held == fill)
-    for one, other in zip(at[:-1], at[1:], strict=True):
+    for one, other in pairwise(at):
         if 1 < other - one <= root.space.degree and root.nodes[other] - root.nodes[one] == other - one:
             new[one + 1 : other] = fill
     return new
@@ -253,7 +256,7 @@ def _assigned(root: ContactPotential, zones: list[tuple[int, int]], places: Arra
             return None
         borders += [Border(number, side) for number, side in zip(numbers, sides, strict=True)]
     taken = [border.end for border in borders]
-    if len(set(taken)) < len(taken) or not all(0 < number < ends.size - 1 and root.movable[number] for number in taken):
+    if len(set(taken)) < len(taken) or not all(0 < number < ends.size - 1 and root.space.movable[number] for number in taken):
         return None
     moved = ends.copy()
     moved[taken] = places
@@ -439,7 +442,7 @@ def _in_place(evaluation: ContactEvaluation) -> bool:
     return bool(forces.min(initial=0.0) >= -_PULL * forces.max(initial=0.0) and free.min(initial=0.0) >= inside)
 
 
-def on_borders(control: Control, potential: ContactPotential) -> Control:
+def on_borders(control: Control, potential: FollowingPotential) -> Control:
     """A control of coefficients on the mesh of the scene as one of those on a mesh that follows borders."""
     if not isinstance(control, ArcLengthControl) or not potential.borders:
         return control

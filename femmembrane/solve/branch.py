@@ -23,6 +23,8 @@ from .state import State, flat_state, joined, rests_flat
 #: the folds looked for: their name and the quantity that is stationary
 FOLDS = {"limit_point": "pressure", "volume_fold": "volume", "height_fold": "center_height"}
 
+#: see :attr:`.CurveProblem.moving`: of borders of contact, and of zones, where errors are smaller for higher degrees
+_CONTACT, _ZONES = 0.02, 0.2
 #: tolerance at which a point is put on a prescribed value
 _EXACT = 1e-13
 #: the loosest tolerance: next to a crossing of branches no correction falls below round-off over the distance to it
@@ -36,6 +38,8 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def __init__(self, potential: Potential) -> None:
         self.potential, self.cornered = potential, potential.scene.tension_field or bool(potential.obstacles)
+        if potential.follows:
+            self.moving = _CONTACT if potential.obstacles else max(0.25, _ZONES / (potential.space.degree + 1))
         self._band, self._half_bandwidth = potential.arc_band, potential.space.half_bandwidth
 
     @property
@@ -58,7 +62,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def unit_point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose tangent is known up to its length."""
-        if not self.potential.obstacles:
+        if not self.potential.follows:
             return self.point(state, tangent / self.norm(tangent), sigma)
         carried = joined(state.evaluation.carried(tangent[:-1]), float(tangent[-1]))
         length = self.norm(carried)
@@ -66,7 +70,7 @@ class BranchProblem(CurveProblem[BranchPoint]):
 
     def point(self, state: State, tangent: Array, sigma: float = 0.0) -> BranchPoint:
         """The point of a state whose unit tangent is known."""
-        own = state.evaluation.brought(tangent) if self.potential.obstacles else None
+        own = state.evaluation.brought(tangent) if self.potential.follows else None
         return BranchPoint(state, joined(state.x, state.pressure), tangent, self.dual(tangent), sigma, own=own)
 
     def resolve(self, guess: Array, row: Array, near: BranchPoint) -> BranchPoint:

@@ -23,7 +23,7 @@ from .newton import TOLERANCE
 from .state import Predictor, State
 
 if TYPE_CHECKING:
-    from ..potential.contact import ContactEvaluation, ContactPotential
+    from ..potential.contact import ContactEvaluation
 
 #: steps so many times the smallest that turn on the spot have met a corner
 CORNER = 100.0
@@ -31,10 +31,8 @@ CORNER = 100.0
 ROUND_OFF = 1e-14
 #: times the error of a point that a prediction from the points before may miss
 _BOTH_ENDS = 10.0
-#: what a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders of contact
-_MOVING = 0.02
 #: how far a point may be from its prediction, relative to its size, where other nodes are held by bodies, or other ends of elements stand
-#: at the borders of contact: the errors of the mesh change at once there, and no shorter step makes that less
+#: at borders: the errors of the mesh change at once there, and no shorter step makes that less
 _REGROUPED = 1e-3
 
 
@@ -125,6 +123,8 @@ class CurveProblem(ABC, Generic[Point]):
         Quantities of the curve with their units: an error is judged relative to the quantity and one unit.
     cornered : bool
         Whether the curve may have corners, which no shorter step makes round.
+    moving : float
+        What a prediction misses, relative to the step, since the errors of a mesh change while its ends follow borders.
     resolution : float
         Smallest change of a quantity, relative to its size, that is told from round-off; a fold within less is none.
     """
@@ -132,6 +132,7 @@ class CurveProblem(ABC, Generic[Point]):
     potential: Potential
     folds: Mapping[str, str]
     cornered: bool = False
+    moving: float = 0.0
     resolution: float = 0.0
 
     @property
@@ -266,7 +267,7 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
         miss = max(miss - _BOTH_ENDS * known * problem.norm(new.z) / length, 0.0)
     if new.own is not None:
         jump = 0.0 if _held_by(point) == _held_by(new) else _REGROUPED * problem.norm(new.z) / length
-        miss = max(miss - _MOVING - jump, 0.0)
+        miss = max(miss - problem.moving - jump, 0.0)
     cosine = float(point.dual @ new.tangent)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     chord = problem.norm(new.z - point.z)
@@ -281,6 +282,6 @@ def _attempt(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> tupl
 
 def _held_by(point: BranchPoint) -> tuple[bytes, tuple[int, ...]]:
     """The nodes that bodies hold, and the ends of elements that stand at borders of contact."""
-    evaluation = cast("ContactEvaluation", point.state.evaluation)
-    potential = cast("ContactPotential", evaluation.potential)
-    return evaluation.held.tobytes(), tuple(end for end, _ in potential.borders)
+    evaluation = point.state.evaluation
+    held = cast("ContactEvaluation", evaluation).held.tobytes() if evaluation.potential.obstacles else b""
+    return held, tuple(end for end, _ in evaluation.potential.borders)

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..discretization.space import Space
+from ..discretization.space import transferred
 from ..errors import Status
 from ..potential import Array, Evaluation, Family, Potential, potential_of
 from ..scene import MAX_DEGREE, Scene
@@ -33,13 +33,6 @@ _MAX_ITERATIONS = 30
 def finer_scene(scene: Scene) -> Scene:
     """The scene on elements of one degree more, or of half the size where there is no higher degree."""
     return scene.replace(degree=scene.degree + 1) if scene.degree < MAX_DEGREE else scene.replace(mesh=scene.mesh.refined())
-
-
-def transferred(space: Space, x: Array, onto: Space) -> Array:
-    """Free coefficients in another space of the interpolant of the displacement with free coefficients x."""
-    points = onto.interpolation_points()
-    u, _, w, _ = space.evaluate(x, points.ravel())
-    return onto.interpolate(u.reshape(points.shape), w.reshape(points.shape))
 
 
 def solved_in(

@@ -13,6 +13,7 @@ from ..kernels.interface import Border
 from ..potential import Array, Evaluation, Potential
 from .active_set import settled
 from .controls import ArcLengthControl, Control, VolumeControl
+from .zone_borders import settled_zones
 
 #: relative size of the Newton correction at which a state counts as converged
 TOLERANCE = 1e-10
@@ -25,6 +26,8 @@ ROUND_OFF, SOFT = 2e-14, 1e-4
 NEARLY_BALANCED = 1e4 * ROUND_OFF
 #: a component of the displacement that is this small beside the other may be round-off of a zero
 NEGLIGIBLE = 1e-12
+#: most iterations of a damped solve
+_PATIENT = 20
 _EPSILON = float(np.finfo(float).eps)
 _LEAST = float(np.finfo(float).tiny)
 #: pressure of a trial step from which on products are no numbers: the trial is refused
@@ -37,7 +40,7 @@ PRESSURE = 1e-9
 class NewtonResult:
     """Where the corrector ended.
 
-    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders of contact where there are any, with ``bordered``.
+    ``x`` is on the mesh of the scene, ``evaluation.x`` on that which follows borders where there are any, with ``bordered``.
     ``correction`` is the relative size of the Newton correction at x by ``bordered``, the last factors, at x or one correction before;
     ``residual`` and ``gap`` are evaluated at x.
     """
@@ -86,6 +89,9 @@ def correct(
     if not potential.unsettled:
         return _corrected(potential, control, x, pressure, magnetic, damped, tolerance, max_iterations)
     once = partial(_corrected, magnetic=magnetic, damped=damped, tolerance=tolerance, max_iterations=max_iterations)
+    if not potential.obstacles:
+        patient = partial(once, damped=True, max_iterations=_PATIENT)
+        return settled_zones(once, patient, control, potential, x, pressure)
     return settled(once, control, potential, x, pressure, magnetic)
 
 

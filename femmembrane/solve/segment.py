@@ -134,9 +134,12 @@ class Segment(Generic[Point]):
         # r0 (1 - t)(1 - 3t) + r1 t (3t - 2) + 6 rise t (1 - t)
         return 3 * (r0 + r1 - 2 * rise), -4 * r0 - 2 * r1 + 6 * rise, r0
 
-    def root(self, kind: str, function: Callable[[Point], float], low: float, high: float) -> Located[Point]:
-        """The point between two shares of the segment where a function of the point changes sign."""
-        return self._root(kind, function, low, high)[1]
+    def root(
+        self, kind: str, function: Callable[[Point], float], low: float, high: float, guess: tuple[float, float] | None = None
+    ) -> Located[Point]:
+        """The point between two shares of the segment where a function of the point changes sign. ``guess`` is a share close to it and the
+        slope of the function there, where they are known."""
+        return self._root(kind, function, low, high, guess)[1]
 
     def _root(
         self, kind: str, function: Callable[[Point], float], low: float, high: float, guess: tuple[float, float] | None = None

@@ -19,13 +19,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..discretization.space import transferred
 from ..errors import SolveError, Status
 from ..potential import Potential
 from .banded import negative_among
 from .bare import inflated, moderate, unloaded, usual_volume, without_load
 from .contact import coarse_at_edge
 from .controls import CONTROLS, ControlKind, Controlled, Gas, PressureControl, VolumeControl
-from .finer_space import transferred
 from .guess import guess_at_volume
 from .homotopy import Fields, Held, follow_homotopy
 from .newton import NEGLIGIBLE, correct

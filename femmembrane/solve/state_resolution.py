@@ -15,6 +15,7 @@ from contextlib import suppress
 
 import numpy as np
 
+from ..discretization.space import transferred
 from ..errors import SolveError, Status
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential, potential_of
@@ -23,7 +24,7 @@ from .banded import negative_among
 from .branch import first_point
 from .contact import coarse_at_edge
 from .controls import VolumeControl
-from .finer_space import counterpart, met_across, moved, solved_in, transferred
+from .finer_space import counterpart, met_across, moved, solved_in
 from .state import State
 from .stepping import march
 from .wellposed import apparent, ill_posed, poles_by_sources

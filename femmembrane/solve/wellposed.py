@@ -91,6 +91,8 @@ def ill_posed(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the equilibrium of an evaluation is ill-posed. None if it is well-posed, or if a finer space does not confirm what this space
     shows.
     """
+    if potential.follows:  # a state whose elements follow borders has a mesh of its own
+        potential = evaluation.potential
     found = apparent(potential, evaluation)
     if found is None or (found.pulled and not found.turned):
         return found
@@ -107,6 +109,8 @@ def _nearly_slack(evaluation: Evaluation) -> bool:
 
 def apparent(potential: Potential, evaluation: Evaluation) -> IllPosed | None:
     """Where the state of an evaluation, an equilibrium or not, is ill-posed on its own mesh."""
+    if potential.follows:
+        potential = evaluation.potential
     slack = potential.scene.tension_field
     taut = not slack and evaluation.once("least meridional stress", _least_meridional) >= 0
     if taut and potential.electric is None:  # the usual case needs no scale

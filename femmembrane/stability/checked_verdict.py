@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..checks import whole
+from ..discretization.space import transferred
 from ..errors import InputError
 from ..potential import Array, Evaluation, Potential
 from ..results.verdict import Verdict
 from ..scene import ALL, MAX_WAVES
-from ..solve.finer_space import counterpart, transferred
+from ..solve.finer_space import counterpart
 from .azimuthal import azimuthal_verdict
 from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError

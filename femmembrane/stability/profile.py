@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization.meridian import LEAST_LENGTH
 from ..discretization.space import space_of_scene
+from ..discretization.strains import strained_at
 from ..physics.electric_wrinkles import ElectricTensionField
 from ..physics.electrified import Electrified
-from ..physics.kinematics import meridional_strain
 from ..physics.loads import over_projection
 from ..physics.magnetics import magnetic_field
 from ..physics.magnetisation import Magnetisation, remanence_column
@@ -101,17 +100,8 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
     s : ndarray, shape (n,)
     """
     space = space_of_scene(scene)
-    u, own, w, _ = space.displacement(x, s)
-    u_s, w_s = space.recovered_slopes(x, s)
-    (R, Z), (R_s, Z_s) = space.mesh.position(s), space.mesh.tangent(s)
-    pole = np.abs(R) <= LEAST_LENGTH * space.size  # there u/R is the limit u_s/R_s
-    u_s = np.where(
-        pole & (u_s / np.where(pole, R_s, 1.0) <= -1), own, u_s
-    )  # a recovered slope overshoots where a few elements hold a drawn-out pole
-    e1 = meridional_strain(R_s, Z_s, u_s, w_s)
-    hoop = np.where(pole, u_s, u) / np.where(pole, R_s, R)
-    e2 = np.log1p(np.where(hoop > -1, hoop, np.nan))  # on a coarse mesh the radius may be negative between quadrature points
-    rho, eta = R + u, Z + w
+    at = strained_at(space, x, s)
+    R, Z, rho, eta, (e1, e2) = at.R, at.Z, at.rho, at.eta, at.strains
     response = response_of(scene, None if scene.electricity is None else potential_of(scene).local_square(x, R, Z, s))
     effective = mechanical = cauchy_stress(response, e1, e2)
     field = None if scene.electric is None else np.zeros_like(e1)  # one of a family may have no voltage
@@ -123,8 +113,9 @@ def profile_at(scene: Scene, x: Array, pressure: float, s: Array) -> Profile:
         field = None if field is None else field * np.sqrt(modulus)
     beyond = response.beyond(e1, e2) if isinstance(response, (TensionField, ElectricTensionField)) else None
     h = magnetic_field(scene.sources, rho, eta) if scene.sources else (0.0, 0.0, 0.0)
-    slope = np.hypot(R_s + u_s, Z_s + w_s)
-    tangent = ((R_s + u_s) / slope, (Z_s + w_s) / slope)
+    along = at.reference[0] + at.slopes[0], at.reference[1] + at.slopes[1]
+    slope = np.hypot(*along)
+    tangent = (along[0] / slope, along[1] / slope)
     local = pressure - over_projection(scene.loads, eta)[1]
     surroundings = local, scene.radius_to_thickness, h, tangent
     magnetisation = Magnetisation.of(scene)

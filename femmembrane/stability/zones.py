@@ -33,9 +33,9 @@ from ..results.equilibrium import Equilibrium
 from ..results.other_mesh import on_mesh_of
 from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
+from ..solve.end_strains import strains_at_ends
 from ..solve.finer_space import confirmed
 from ..solve.newton import NewtonResult
-from .end_strains import strains_at_ends
 from .profile import profile_at
 
 Array = NDArray[np.float64]

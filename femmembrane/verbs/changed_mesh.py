@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..discretization.space import Space
+from ..discretization.space import Space, transferred
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
 from ..solve.branch import BranchProblem, tangent_at
 from ..solve.continuation import BranchPoint
-from ..solve.finer_space import transferred
 from ..solve.newton import NewtonResult
 from ..solve.state import Predictor, State, joined
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..accuracy.borders import holding
 from ..accuracy.convergence import EIGENVALUE_ROUND_OFF, profile_norms
 from ..checks import only, switch
+from ..discretization.space import transferred
 from ..errors import SolveError, Status
 from ..potential import Array, potential_of
 from ..results.convergence import COMPARED, PROFILES, ROUND_OFF, Convergence
@@ -17,7 +18,6 @@ from ..scene import MAX_DEGREE, Scene
 from ..scene.run import GAS
 from ..solve.bare import usual_volume
 from ..solve.controls import CONTROLS, Control, control_kind
-from ..solve.finer_space import transferred
 from ..solve.newton import correct
 from ..solve.state import State
 from ..threads import one_thread

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..checks import sign
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Evaluation, Family, Potential, potential_of
 from ..results.branch import Branch
@@ -22,7 +23,6 @@ from ..solve import state_resolution, wellposed
 from ..solve.branch import FOLDS
 from ..solve.contact import stopped_by_source, touches_source
 from ..solve.continuation import StepControl, Tracer, trace_points
-from ..solve.finer_space import transferred
 from ..solve.fold_curve import KINDS, FoldProblem, first_fold
 from ..solve.number_curve import NUMBER, TURN, NumberPoint
 from ..solve.segment import Located, Segment

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar
 
+from ..discretization.space import transferred
 from ..errors import SolveError, Status
 from ..potential import potential_of
 from ..results.equilibrium import Equilibrium
 from ..scene import Scene
-from ..solve.finer_space import transferred
 from .arguments import check_scene
 
 if TYPE_CHECKING:

@@ -109,7 +109,7 @@ class Run(ABC, Generic[R]):
     def scene_of(self, state: State) -> Scene:
         """The scene of a state."""
         own = state.evaluation.potential
-        return self.scene.bordered(own.scene.borders) if own.obstacles else self.here
+        return self.scene.bordered(own.scene.borders) if own.follows else self.here
 
     @abstractmethod
     def step(self) -> End | None:

@@ -64,7 +64,9 @@ def equilibria(scene: Scene, *, pressure: float | None = None, volume: float | N
 
 def _found(scene: Scene, control: str, load: float, max_steps: int) -> tuple[list[Equilibrium], Search]:
     """The equilibria of a scene with a mesh, and what was done to find them."""
-    search = Search(potential_of(scene), control, load, max_steps)
+    # many states are looked at, of which few are kept
+    potential = potential_of(scene.replace(follow_borders=None) if scene.follows_zones else scene)
+    search = Search(potential, control, load, max_steps)
     search.run()
     return [record_on_borders(scene, state, holding(CONTROLS[control].at(load))) for state in search.states], search
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..accuracy.borders import Solve, put_on_borders
 from ..checks import store
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import ContactFamily, Potential
 from ..results.analyses import answer_at_once
@@ -17,6 +18,7 @@ from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium, recorded
 from ..results.path_memory import PathMemory
 from ..results.special_point import SpecialPoint
+from ..results.zones import KINDS, ZoneChange
 from ..scene import Scene
 from ..solve.continuation import BranchPoint
 from ..solve.controls import Gas, PressureControl, VolumeControl
@@ -24,6 +26,7 @@ from ..solve.newton import RESIDUAL, correct, relative_residual
 from ..solve.segment import Located
 from ..solve.state import Predictor, State
 from ..solve.wellposed import ill_posed
+from ..solve.zone_events import ZoneEvent
 
 if TYPE_CHECKING:
     from .running import Run
@@ -41,8 +44,8 @@ def resume(potential: Potential, start: Equilibrium) -> State:
     if start.state.shape != (potential.space.n_free,):
         raise InputError("start", start, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
     x = start.state
-    if potential.obstacles and start.scene.borders:
-        x = start.potential.evaluate(x, start.pressure).carried(x)
+    if start.scene.borders:
+        x = transferred(start.potential.space, x, potential.space)
     result = correct(potential, VolumeControl(start.volume), x, start.pressure)
     if result.status is not Status.CONVERGED:
         result = correct(potential, PressureControl(start.pressure), x, start.pressure)
@@ -65,7 +68,7 @@ def restore(potential: Potential, kept: Equilibrium, number: float = 1.0) -> Sta
     kept = kept.of_branch
     if kept.state.shape != (potential.space.n_free,):
         raise InputError("start", kept, f"an equilibrium with {potential.space.n_free} unknowns (the same mesh and degree) is allowed")
-    if potential.obstacles:
+    if potential.follows:
         borders = kept.scene.borders
         potential = potential.bordered(borders) if isinstance(potential, ContactFamily) else kept.potential
     evaluation = potential.evaluate(kept.state, kept.pressure, number)
@@ -122,16 +125,17 @@ def record_on_borders(
         Where it is lost on the way.
     """
     potential = state.evaluation.potential
-    if not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
+    if potential.follows:
+        scene = scene.bordered(potential.scene.borders)
+    followed = potential.follows and not potential.obstacles
+    if followed or not scene.follows_zones or ill_posed(potential, state.evaluation) is not None:
         return record(scene, potential, state, previous, clock, gas)
-    found = put_on_borders(scene, scene, state, solve)
-    if found.scene is scene:
+    own, there = put_on_borders(scene, state, solve)
+    if own is scene or own == scene:
         return record(scene, potential, state, previous, clock, gas)
-    own = found.state.evaluation.potential
-    moved = found.scene.bordered(own.scene.borders) if own.obstacles else found.scene
-    new = record(moved, own, found.state, previous, clock, gas)
-    there = potential, state.evaluation.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
-    store(new, on_branch=recorded(scene, *there))
+    new = record(own, there.evaluation.potential, there, previous, clock, gas)
+    on_branch = state.evaluation.x, state.pressure, state.evaluation, state.status, state.residual, state.iterations, gas
+    store(new, on_branch=recorded(scene, potential, *on_branch))
     return new
 
 
@@ -142,4 +146,5 @@ def special_point(run: Run[Branch], scene: Scene, located: Located[BranchPoint],
     # over a number the direction is none of the branch of one scene
     tangent = point.tangent.copy() if located.kind == "branch_point" and len(point.tangent) == len(state.x) + 1 else None
     place = (eq.volume, eq.pressure, eq.center_height)
-    return SpecialPoint(located.kind, *place, located.error, eq, azimuthal=azimuthal, over=run.over, tangent=tangent)
+    zone = ZoneChange(KINDS[located.zone], located.place, *located.radii) if isinstance(located, ZoneEvent) else None
+    return SpecialPoint(located.kind, *place, located.error, eq, azimuthal=azimuthal, over=run.over, tangent=tangent, zone=zone)

@@ -113,7 +113,8 @@ def trace(
     steps : StepControl, optional
         Lengths and accuracy of the steps.
     special_points : bool
-        Whether limit points, volume folds, height folds and branch points are located.
+        Whether limit points, volume folds, height folds and branch points are located; with bodies in the way where they are touched and
+        let go, in a tension field where zones open and close.
     ill_posed : {"stop", "mark"}
         What to do where the states depend on the mesh: "stop" ends there, "mark" goes on and gives every such state its status. The states
         of a plain membrane depend on the mesh where the meridional stress is compressive, since the Legendre-Hadamard condition fails

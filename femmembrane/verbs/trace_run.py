@@ -14,6 +14,7 @@ from ..accuracy.along import Along
 from ..accuracy.borders import Solve, holding
 from ..checks import choice, is_number, number, sign, store
 from ..discretization.meridian import in_words
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
 from ..results.branch import Branch
@@ -29,12 +30,13 @@ from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
 from ..solve.continuation import BranchPoint, CurveProblem, Followed, StepControl, Tracer, trace_points
 from ..solve.controls import CONTROLS, check_height
-from ..solve.finer_space import met_across, transferred
+from ..solve.finer_space import met_across
 from ..solve.segment import Located, Segment
 from ..solve.special_points import branch_points, branches_crossing
 from ..solve.start import start_at_volume
 from ..solve.state import Predictor, State, at_rest
 from ..solve.switching import Crossing, crossing_at, points_beyond, same_crossing
+from ..solve.zone_events import ZoneEvent, zone_events
 from ..stability.azimuthal import azimuthal_eigenvalue
 from .arguments import check_ill_posed, check_max_steps
 from .changed_mesh import carried_path, carried_point, goes_alike, state_there
@@ -497,10 +499,15 @@ class TraceRun(Run[Branch]):
         with self.timed("special_points"):
             located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
             crossed = self.crossed(segment)
-            for fold in sorted(located + crossed + contact_events(segment), key=lambda f: f.point.sigma):
+            located += [*crossed, *contact_events(segment), *self._zone_events(segment)]
+            for fold in sorted(located, key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))
             return self.closing(segment, crossed, last)
+
+    def _zone_events(self, segment: Segment[BranchPoint]) -> list[ZoneEvent]:
+        """Where zones of a tension field open or close."""
+        return zone_events(segment, self.own) if self.scene.tension_field else []
 
     def closing(self, segment: Segment[Any], crossed: Sequence[Located[Any]], last: BranchPoint | None) -> BranchPoint | None:
         """The point at which the branch comes back to where it set out, if it does so before the end of the trace."""
@@ -541,7 +548,7 @@ class TraceRun(Run[Branch]):
     def _onset(self, segment: Segment[BranchPoint], n: int, low: float, top: float, guess: Array | None = None) -> SpecialPoint:
         def eigenvalue(point: BranchPoint) -> float:
             potential, own = self.potential_at(point), point.state.evaluation
-            if potential.obstacles:
+            if potential.follows:
                 potential = own.potential
             return azimuthal_eigenvalue(potential, own.x, point.state.pressure, n, guess).value
 

@@ -43,6 +43,8 @@ MARKERS = {
     "azimuthal_onset": ("v", "azimuthal onset"),
     "touch": (">", "first touch of a body"),
     "release": ("<", "last touch of a body"),
+    "zone_opens": ("P", "a zone opens"),
+    "zone_closes": ("X", "a zone closes"),
 }
 
 
@@ -222,6 +224,8 @@ def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:
         "height_fold": (),
         "number_fold": tuple(branch.hold),
         "azimuthal_onset": (point.azimuthal,),
+        "zone_opens": (),
+        "zone_closes": (),
     }
     return of_kind.get(str(point.kind))
 

@@ -193,6 +193,8 @@ def _state(state: State, place: Array, names: Sequence[str], units: Units) -> di
 
 def _point_name(point: SpecialPoint) -> str:
     name = _kind_name(point)
+    if point.zone is not None:
+        return f"{name}: {point.zone}"
     return f"{name}, n = {point.azimuthal}" if point.azimuthal else name
 
 

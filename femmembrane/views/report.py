@@ -14,12 +14,14 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Status
 from ..files import replace_file
 from ..quantities import PLACES, Units, axis_label, caption, heading_in, words
 from ..results.analyses import asked
 from ..results.analyses.base import Curves, Drawing, Section
+from ..results.curve import slopes_of
 from . import plots
 from .backend import load
 from .html import branch_rows, page_of, pairs, table, text
@@ -39,6 +41,8 @@ _WIDTH, _HEIGHT = 4.7, 3.9
 _CURVES = 6
 #: least range of an axis relative to the values on it
 _LEAST_RANGE = 0.01
+#: columns of a table that stands beside a figure, equilibria that are shown as dots, and corners of a curve between two of them
+_MOST_BESIDE, _DOTS, _FINE = 3, 20, 8
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)))
 _COLORS = ("#0072b2", "#d55e00", "#222222", "#a01040")
 
@@ -162,7 +166,8 @@ class _Page:
             [
                 names.get(str(p.kind), str(p.kind))
                 + (f", n = {p.azimuthal}" if p.azimuthal else "")
-                + (f", {word}" if (word := plots.after(p)) else ""),
+                + (f", {word}" if (word := plots.after(p)) else "")
+                + (f": {p.zone}" if p.zone else ""),
                 *(p.equilibrium.number(name) for name in over),
                 *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
@@ -196,7 +201,8 @@ class _Page:
         if section.figure is not None:
             parts.append(self._figure(_figure_of(section.figure, self.branch), section.figure.label))
         if section.table is not None:
-            parts.append(table(section.table.header, section.table.rows, caption=section.table.caption))
+            shown = table(section.table.header, section.table.rows, caption=section.table.caption)
+            parts.append(f'<div class="wide">{shown}</div>' if len(section.table.header) > _MOST_BESIDE else shown)
         last = pairs((remark.subject, remark.text) for remark in section.last)
         return _beside(*parts) + (f"<h3>The last equilibrium</h3>{last}" if section.last else "")
 
@@ -342,6 +348,24 @@ def _draw_steps(axes: Any, branch: Branch, values: Array, kind: int, named: str)
     look: dict[str, Any] = {"linestyle": _DASHES[kind % 4], "color": _COLORS[kind % 4], "linewidth": 1.8}
     for first, last in pairwise(breaks):
         steps = np.arange(first, last)
-        axes.plot(steps, values[steps], marker="." if len(branch) <= 20 else "", label=new_label(axes, named), **look)
+        axes.plot(*_smooth(steps, values[steps]), label=new_label(axes, named), **look)
+        if len(branch) <= _DOTS:
+            axes.plot(steps, values[steps], ".", color=look["color"])
     axes.set_xlabel(axis_label("step"))
     axes.xaxis.get_major_locator().set_params(integer=True)
+
+
+def _smooth(steps: NDArray[np.int64], values: Array) -> tuple[Array, Array]:
+    """A curve through values at steps, with the slopes of parabolas through neighbours; values with gaps as they are.
+
+    What is positive is drawn by its logarithm, so that the curve is positive too.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    if len(steps) < 3 or not np.isfinite(values).all():
+        return steps.astype(float), values
+    positive = bool((values > 0).all())
+    drawn = np.log(values) if positive else values
+    fine = np.linspace(steps[0], steps[-1], _FINE * (len(steps) - 1) + 1)
+    curve = CubicHermiteSpline(steps, drawn, slopes_of(drawn, np.ones(len(steps) - 1)))(fine)
+    return fine, np.exp(curve) if positive else curve

@@ -24,6 +24,7 @@ section { background: var(--paper); border: 1px solid var(--line); border-radius
 .tile { background: var(--paper); border: 1px solid var(--line); border-radius: 10px; padding: 10px 14px; }
 .tile b { display: block; font-size: 1.05rem; font-variant-numeric: tabular-nums; } .tile span { color: var(--soft); font-size: .8rem; }
 .figures > * { min-width: 0; }
+.figures > .wide { grid-column: 1 / -1; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 420px), 1fr)); gap: 20px; align-items: start; }
 figure { margin: 0; min-width: 0; max-width: 620px; } figure svg { display: block; width: 100%; height: auto; fill: var(--ink); }
 .figures > div > figure + figure { margin-top: 18px; }

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.discretization.meridian import through
+from femmembrane.discretization.meridian import assigned_ends
+from femmembrane.discretization.space import space_of
 
 from ..cases import OGDEN, SUSCEPTIBILITY, disc_scene
 from ..shooting import Membrane, solve
@@ -110,7 +111,7 @@ def test_ten_digits_with_sixteen_elements_of_degree_six(height):
     assert abs(eq.pressure / expected.pressure - 1) > 1e-8  # with borders inside elements
     assert on.volume == pytest.approx(expected.volume, rel=1e-12)
     # the borders are ends of elements, and who is there stays there
-    assert set(on.zones("mechanical").borders) <= set(on.scene.mesh.radii)
+    assert set(on.zones("mechanical").borders) <= set(on.potential.space.ends)
     assert on.on_borders() is on
 
 
@@ -158,7 +159,7 @@ def test_where_there_is_no_border_nothing_is_done():
 def test_as_many_elements_as_zones_are_enough_and_fewer_are_refused():
     on = at_height(3, 6, -0.3).on_borders("center_height")
     assert on.pressure == pytest.approx(DISC[-0.3].pressure, rel=5e-6)
-    np.testing.assert_allclose(on.scene.mesh.radii[1:-1], DISC[-0.3].borders, atol=1e-5)
+    np.testing.assert_allclose(on.potential.space.ends[1:-1], DISC[-0.3].borders, atol=1e-5)
     with pytest.raises(fm.InputError, match="the membrane has 3 zones where this mesh has 2 elements"):
         at_height(2, 6, -0.3).on_borders("center_height")
 
@@ -178,13 +179,22 @@ def test_a_slack_membrane_is_refused():
         ended[-1].on_borders()
 
 
-def test_the_nearest_ends_are_moved_and_the_others_follow():
+def test_the_nearest_ends_are_moved():
     ends = np.linspace(0.0, 1.0, 6)
-    np.testing.assert_allclose(through(ends, np.array([0.45])), [0, 0.225, 0.45, 0.633333333, 0.816666667, 1], atol=1e-9)
+    assert assigned_ends(ends, np.array([0.45])) == ((2, 0.45),)
     # two places nearest to one end: both get one, by the smaller way in all
-    np.testing.assert_allclose(through(ends, np.array([0.39, 0.42]))[[2, 3]], [0.39, 0.42])
-    np.testing.assert_allclose(through(ends, np.array([0.35, 0.39]))[[1, 2]], [0.35, 0.39])
-    # ends that have to stay do so, and a place that is one needs no other
-    moved = through(ends, np.array([0.4, 0.65]), fixed=(0.4,))
-    assert (moved[2], moved[3]) == (0.4, 0.65)
-    assert through(ends, np.array([0.4]), fixed=(0.4,)) is ends
+    assert assigned_ends(ends, np.array([0.39, 0.42])) == ((2, 0.39), (3, 0.42))
+    assert assigned_ends(ends, np.array([0.35, 0.39])) == ((1, 0.35), (2, 0.39))
+    # ends that have to stay do so
+    assert assigned_ends(ends, np.array([0.41, 0.42]), stay=(2,)) == ((3, 0.41), (4, 0.42))
+    with pytest.raises(fm.InputError, match="4 zones where this mesh has 3 elements"):
+        assigned_ends(ends, np.array([0.41, 0.42, 0.43]), stay=(2,))
+
+
+def test_the_others_are_carried_along():
+    """Between two ends that stay or are moved elements keep their proportions."""
+    space = space_of(fm.disc(5, ratio=2.0), 2)
+    moved = space.with_moved(((2, 0.45),))
+    assert moved.ends[2] == 0.45
+    np.testing.assert_allclose(moved.ends[1] / 0.45, space.ends[1] / space.ends[2], rtol=1e-14)
+    np.testing.assert_allclose((1 - moved.ends[3:]) / 0.55, (1 - space.ends[3:]) / (1 - space.ends[2]), rtol=1e-14)

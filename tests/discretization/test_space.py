@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.discretization.elements import shape_functions
 from femmembrane.discretization.meridian import Disc
 from femmembrane.discretization.space import Space
 from femmembrane.potential import Potential
@@ -238,3 +239,15 @@ def test_quadrature_matters_less_than_the_mesh(degree, name):
 def test_a_mesh_that_holds_no_shape_is_refused(mesh, degree):
     with pytest.raises(fm.InputError, match=r"mesh\.elements"):
         fm.equilibrium(fm.Scene(material=fm.NeoHookean(), mesh=mesh, degree=degree), volume=5.0)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 6, 9])
+def test_an_end_of_an_element_is_its_node_however_many_points_are_asked_for(degree):
+    """To the bit, or a pole would leave the axis by round-off. Between them few points and many answer alike."""
+    many = np.linspace(0.0, 1.0, 101)
+    value, slope = shape_functions(degree, many)
+    assert value[[0, -1]].tolist() == np.eye(degree + 1)[[0, -1]].tolist()
+    for k in (0, 37, 100):
+        few, rate = shape_functions(degree, many[k : k + 1])
+        np.testing.assert_allclose(value[k], few[0], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(slope[k], rate[0], rtol=0, atol=1e-12)

@@ -7,6 +7,7 @@ import numpy as np
 import femmembrane as fm
 
 from ..cases import OGDEN, disc_scene
+from ..verification.test_relaxed_states import pillow
 from .registry import Family, Number, Stop, settled
 
 FAMILY = Family(4, "slack")
@@ -92,3 +93,51 @@ def waves_in_compression() -> tuple[float, float]:
     """Unstable for short waves, said so, without a number."""
     verdict = fm.equilibrium(disc_scene(OGDEN, (400.0, -3.25), 32), center_height=-0.1).verdict(azimuthal=50)
     return float(verdict.stable is False), float(np.isnan(verdict.smallest_eigenvalue) and "short" in verdict.reason)
+
+
+#: what wrinkles do below this dipole: tests/accuracy/test_borders.py and tests/solve/test_zone_events.py, by shooting
+WRINKLES = (400.0, -3.75)
+BORDERS, VOLUME, PRESSURE = (0.2137303397757, 0.611444042248), -0.11434457467706287, 1.2176228677685645
+OPENS, CLOSES = 1.0044212174383782, 1.2860120813168887
+
+
+def following(elements: int, degree: int) -> fm.Scene:
+    return disc_scene(OGDEN, WRINKLES, elements, degree).replace(tension_field=True, follow_borders=True)
+
+
+@FAMILY.case("a border within 1e-9 of an end, 8 of degree 6", "nothing is left to move", Number(PRESSURE, rel=1e-10), 1e-9)
+@FAMILY.case("a border on an end, 8 of degree 6", "an element of no length", Number(PRESSURE, rel=1e-10), 0.0)
+def border_at_an_end(miss: float) -> float:
+    inner, outer = BORDERS
+    ends = (0.0, 0.1, inner + miss, 0.35, 0.5, outer - miss, 0.75, 0.9, 1.0)
+    scene = following(8, 6).replace(mesh=fm.disc(radii=ends))
+    return settled(fm.equilibrium(scene, volume=VOLUME, start=fm.equilibrium(scene, center_height=-0.3))).pressure
+
+
+@FAMILY.case("a trace over two zone events, 8 of degree 6", "no zone has a width there", Number((OPENS, CLOSES), rel=1e-10), 8, 6)
+@FAMILY.case("the same, 4 of degree 4", "the zone is smaller than an element", Number((OPENS, CLOSES), rel=2e-4), 4, 4)
+@FAMILY.case("the same, 16 of degree 1", "strains are wrong by as much as they are", Number((OPENS, CLOSES), rel=3e-3), 16, 1)
+def over_zone_events(elements: int, degree: int) -> tuple[float, float]:
+    branch = fm.trace(following(elements, degree), start=0.5, direction=-1, until={"center_height": -0.55}, max_steps=60)
+    if branch.status is not fm.Status.CONVERGED:
+        raise AssertionError(str(branch.status))
+    opens, closes = (point for point in branch.special_points or () if point.zone)
+    return opens.pressure, closes.pressure
+
+
+@FAMILY.case("wrinkles up to the slack circle, following", "the mesh folds before the membrane", Stop(fm.Status.SLACK, "tension vanishes"))
+def followed_to_the_slack_circle() -> fm.Branch:
+    scene = disc_scene(OGDEN, STRONG, 16, 4).replace(tension_field=True, follow_borders=True)
+    return fm.trace(scene, start=2.1, until={"center_height": 0.1}, direction=-1, max_steps=60)
+
+
+@FAMILY.case("a pillow at P = 1e-6, following", "the taut zone at its pole closes: a Mylar balloon", Number((0.7627600232, 1.0), rel=1e-9))
+def wholly_wrinkled() -> tuple[float, float]:
+    """The radius of the rim, 3e-7 above that of the balloon, and the part that is wrinkled, to 1e-2 of it."""
+    scene = pillow(12, 5).replace(follow_borders=True)
+    eq = fm.equilibrium(scene, volume=0.7)
+    for pressure in (1e-2, 1e-4, 1e-6):
+        eq = fm.equilibrium(scene, pressure=pressure, start=eq)
+        if not eq.residual < 1e-5:  # stresses are 1e-6 of the modulus
+            raise AssertionError(f"forces are out of balance by {eq.residual:.2g}")
+    return float(eq.profile([1.0])["rho"][0]), round(eq.zones("mechanical").fraction("radial"), 2)

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 
 import femmembrane as fm
 from femmembrane.results.verdict import Verdict
 from femmembrane.scene.variation import Parameter, Scale, names, parameter_of
-from femmembrane.solve.responses import Responses
 from femmembrane.stability.eigenvalue_rates import require_simple
 from femmembrane.stability.spectrum import Pencil
 
@@ -111,48 +109,6 @@ def test_derivatives_are_those_of_the_whole_solve(case: str) -> None:
     scene, held = SCENES[case]
     to = [name for name in names(scene) if not name.endswith((".1", ".2"))]
     compare(scene, held, (*STATE, "rho", "eta", "stretch_1", "stretch_2", "mechanical_stress_1", "total_stress_2"), to)
-
-
-def test_the_jacobian_of_a_fit_is_that_of_records() -> None:
-    """Twenty heights, some beyond the limit point: answers and Jacobian against records, and a fit that comes back to its numbers."""
-    scene = fm.Scene(fm.Ogden((1.25,), (1.6,)), DISC)
-    heights = np.linspace(1.2, 0.1, 12)
-    responses = Responses(
-        scene, "center_height", heights, ["material.mu.0", "material.alpha.0"], ["pressure", "volume", ("stretch_2", 0.0)]
-    )
-    there = responses([0.8, 2.5])
-    rubber = fm.Scene(fm.Ogden((0.8,), (2.5,)), DISC)
-    for k in (0, 6):
-        eq = solved(rubber, {"center_height": heights[k]})
-        assert there.values[k] == pytest.approx([eq.pressure, eq.volume, eq.profile([0.0])["stretch_2"][0]], rel=1e-10)
-    h = np.array([0.0, 2e-2])
-    slopes = [(responses([0.8, 2.5] + t * h).values - responses([0.8, 2.5] - t * h).values) / (2 * t * h[1]) for t in (1.0, 0.5, 0.25)]
-    fourth = [(4 * b - a) / 3 for a, b in pairwise(slopes)]
-    assert there.jacobian[..., 1] == pytest.approx((16 * fourth[1] - fourth[0]) / 15, rel=1e-6, abs=1e-8)
-    # the pressure is linear in the only modulus
-    assert there.jacobian[:, 0, 0] == pytest.approx(there.values[:, 0] / 0.8, rel=1e-10)
-
-    def misfit(numbers: Any) -> Any:
-        return responses(numbers).values[:, 0] - there.values[:, 0]
-
-    fit = least_squares(misfit, [1.25, 1.6], jac=lambda numbers: responses(numbers).jacobian[:, 0])
-    assert fit.x == pytest.approx([0.8, 2.5], rel=1e-8)
-
-
-@pytest.mark.parametrize("name", ["membrane.prestretch", "mesh.rim.radius"])
-def test_a_fit_may_move_the_rim(name: str) -> None:
-    scene = fm.Scene(fm.NeoHookean(), DISC, prestretch=1.2)
-    if name.startswith("mesh"):
-        scene = fm.Scene(fm.NeoHookean(), fm.disc(16, rim={"kind": "clamped", "radius": 1.2}))
-    of = ["pressure", "center_height", ("rho", 0.5), ("eta", 0.25), ("stretch_1", 0.3), ("stretch_2", 0.0)]
-    responses = Responses(scene, "volume", [1.0, 2.0], [name], of)
-    found = responses([1.3])
-    slopes = [(responses([1.3 + h]).values - responses([1.3 - h]).values) / (2 * h) for h in (2e-3, 1e-3)]
-    assert found.jacobian[..., 0] == pytest.approx((4 * slopes[1] - slopes[0]) / 3, rel=1e-7, abs=1e-9)
-    eq = solved(Parameter(scene, name).scene_at(1.3), {"volume": 2.0})
-    profile = eq.profile([0.5, 0.25, 0.3, 0.0])
-    expected = [profile[asked[0]][k] for k, asked in enumerate(of[2:])]
-    assert found.values[1] == pytest.approx([eq.pressure, eq.center_height, *expected], rel=1e-9)
 
 
 def along_numbers(scene: fm.Scene, to: Sequence[str], answer: Any, mine: Mapping[str, Any], rel: float = 1e-6) -> None:

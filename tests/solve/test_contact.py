@@ -409,6 +409,17 @@ def test_a_body_on_the_wrong_side_is_not_said_to_cut(body, said):
     assert str(error.value).endswith("other side") is said.endswith("other side")
 
 
+def test_a_mesh_that_stays_loses_the_order_of_its_elements():
+    """With the plate at 0.5 errors of P then fall as the square at the best; by default ends of elements follow the border."""
+    scene = fm.Scene(material=NH, mesh=fm.disc(32), obstacles=[fm.Plane(height=0.5)])
+    eq, stays = (fm.equilibrium(each, volume=1.2489) for each in (scene, scene.replace(follow_borders=False)))
+    fine = fm.equilibrium(scene.replace(mesh=fm.disc(64), degree=4), volume=1.2489)
+    assert eq.scene.borders
+    assert not stays.scene.borders
+    assert abs(stays.pressure - fine.pressure) > 10 * abs(eq.pressure - fine.pressure)
+    assert scene.replace(follow_borders=False).to_dict()["mesh"]["follow_borders"] is False
+
+
 def test_the_curve_of_a_branch_has_its_corner_where_contact_begins():
     """Cubics on either side of the touch of a ball have the directions of their own side."""
     scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16), prestretch=1.2, obstacles=[fm.Ball(0.8, 0.5)])

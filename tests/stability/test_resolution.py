@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
+from femmembrane.discretization.space import transferred
 from femmembrane.potential import potential_of
 from femmembrane.solve.controls import VolumeControl
-from femmembrane.solve.finer_space import transferred
 from femmembrane.solve.minimize import minimize
 from femmembrane.solve.newton import correct
 from femmembrane.solve.state import State

@@ -13,12 +13,13 @@ from html import escape
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import femmembrane as fm
 from femmembrane.cli import main
 from femmembrane.views import svg
-from femmembrane.views.report import report
+from femmembrane.views.report import _smooth, report
 from tests.cases import disc_scene
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
@@ -252,3 +253,15 @@ def test_in_a_browser(tmp_path: Path) -> None:
         assert len(seen["figures"]) >= 7
         assert all(w > 300 and h > 200 and min(drawn) > 100 for w, h, *drawn in seen["figures"])
         assert all(w <= width for w, *_ in seen["figures"])
+
+
+def test_curves_over_steps_go_through_the_values_without_corners() -> None:
+    """A parabola through four of its values is the parabola; what is positive stays positive; gaps stay gaps."""
+    steps = np.arange(5, 9)
+    fine, curve = _smooth(steps, (steps - 6.2) ** 2 - 1.0)
+    np.testing.assert_allclose(curve, (fine - 6.2) ** 2 - 1.0, atol=1e-12)
+    assert len(fine) == 25
+    _, steep = _smooth(steps, np.array([1.0, 1e-6, 1e-6, 1.0]))
+    assert steep.min() > 0
+    gaps = np.array([1.0, np.nan, 2.0, 3.0])
+    np.testing.assert_array_equal(_smooth(steps, gaps)[1], gaps)

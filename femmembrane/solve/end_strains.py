@@ -11,21 +11,20 @@ in which psi is the density of the potential at the end.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from ..discretization.elements import lobatto
 from ..discretization.space import HESSIAN_PAIRS
 from ..physics.kinematics import hencky_strains
 from ..potential import Array, Evaluation, Potential
-from ..scene import Scene
 
 
-@lru_cache(maxsize=16)
-def _at_ends(scene: Scene) -> Potential:
-    """The potential with its densities at both ends of each element."""
-    return Potential(scene, 0)
+class _AtEnds(Potential):
+    """A potential with its densities at both ends of each element, with the expressions of another one."""
+
+    def __init__(self, like: Potential) -> None:
+        self._like = like
+        super().__init__(like.scene, 0)
 
 
 def strains_at_ends(potential: Potential, evaluation: Evaluation, pressure: float) -> Array:
@@ -34,7 +33,7 @@ def strains_at_ends(potential: Potential, evaluation: Evaluation, pressure: floa
     They are NaN on the axis.
     """
     x, factor = evaluation.x, evaluation.factor
-    there = _at_ends(potential.scene)
+    there = _AtEnds(potential)
     own = there.space
     forces = _forces(potential, evaluation, pressure)
     with np.errstate(all="ignore"):  # on the axis a hoop strain is no number

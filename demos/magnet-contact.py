@@ -44,28 +44,30 @@ SNAP = "#9a1150"
 FACE = MAGNET.obstacle.length / 2
 
 
-def turns() -> tuple[fm.Branch, list[fm.SpecialPoint]]:
+def turns(scene: fm.Scene, max_steps: int) -> tuple[fm.Branch, list[fm.SpecialPoint]]:
     """The branch over the distance, and the points at which it turns: where the membrane snaps on, and where it lets go."""
-    branch = fm.trace(SCENE, over=OVER, hold={"pressure": 0.0}, until={OVER: DOWN[-1]}, direction=-1)
+    branch = fm.trace(scene, over=OVER, hold={"pressure": 0.0}, until={OVER: DOWN[-1]}, direction=-1, max_steps=max_steps)
     found = [point for point in branch.special_points or () if point.kind == "number_fold"]
     return branch, found[:2]
 
 
-def loop() -> fm.Branch:
+def loop(scene: fm.Scene) -> fm.Branch:
     """The membrane while the magnet comes and goes."""
-    return fm.vary(SCENE, OVER, [*DOWN, *UP], hold={"pressure": 0.0}, at_limit="jump")
+    return fm.vary(scene, OVER, [*DOWN, *UP], hold={"pressure": 0.0}, at_limit="jump")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/magnet-contact"), help="folder for table, picture and movie")
     parser.add_argument("--no-movie", dest="movie", action="store_false", help="leave the movie out")
+    parser.add_argument("--quick", action="store_true", help="half as many elements, on which the branch is lost at the edge of the magnet")
     options = parser.parse_args(arguments)
+    scene = SCENE.replace(mesh=fm.disc(elements=48)) if options.quick else SCENE
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
 
-    branch, (on, off) = turns()
-    path = loop()
+    branch, (on, off) = turns(scene, 40 if options.quick else 200)
+    path = loop(scene)
     print("distance     pole    force   radius")
     rows = [(eq.number(OVER) - FACE, eq.center_height, eq.contact.force, eq.contact.radius if eq.contact.touching else 0.0) for eq in path]
     for row in rows:

@@ -7,7 +7,7 @@ of the bottle at last, where it is thinnest. The thickness 1/(l1 l2) over the wa
 A cone takes the limit point away: with the apex of a cone in its way the pressure of a neo-Hookean disc, which has a limit point at
 P = 1.879, rises all along the branch.
 
-    python demos/bottle.py             table and picture in out/bottle, 15 seconds
+    python demos/bottle.py             table and picture in out/bottle (--movie: a movie as well), 15 seconds
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 import femmembrane as fm
 from femmembrane.files import write_csv
 from femmembrane.views import plots
+from femmembrane.views.viewer import view
 
 BOTTLE = fm.Mould([(1.0, 0.0), (1.0, 0.8), (0.5, 1.4), (0.5, 1.9), (0.0, 1.9)], rounding=0.3)
 SCENE = fm.Scene(material=fm.Gent(30.0), mesh=fm.disc(64), obstacles=[BOTTLE], title="A membrane blown into a bottle")
@@ -39,7 +40,9 @@ def thickness(eq: fm.Equilibrium) -> np.ndarray:
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/bottle"), help="folder for picture and table")
-    out = parser.parse_args(arguments).out
+    parser.add_argument("--movie", action="store_true", help="write a movie as well")
+    options = parser.parse_args(arguments)
+    out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
 
     branch = fm.trace(SCENE, start=0.4, until={"pressure": 9.0})
@@ -55,6 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cone = fm.trace(CONE, start=0.3, until={"pressure": 4.0})
     print(f"in a cone: P rises up to {cone[-1].pressure:.3f}, special points: {', '.join(p.kind for p in cone.special_points)}")
     _draw(branch, out / "bottle.png")
+    if options.movie:
+        view(branch, movie=out / "bottle.gif")
     _check(branch, cone)
 
 

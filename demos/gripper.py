@@ -4,7 +4,7 @@ A stretched neo-Hookean membrane below a rigid ball is inflated. It touches the 
 grows with the pressure. The pressure of contact is larger than that of the gas in front of a ball, by the tension along and across its
 curvature: p = P + (T_1 + T_2)/R at the pole. Under pressure control all states are stable, against waves around the axis too.
 
-    python demos/gripper.py             table and picture in out/gripper, 10 seconds
+    python demos/gripper.py             table and picture in out/gripper (--movie: a movie as well), 10 seconds
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 import femmembrane as fm
 from femmembrane.files import write_csv
 from femmembrane.views import plots
+from femmembrane.views.viewer import view
 
 BALL = fm.Ball(height=0.8, radius=0.5)
 SCENE = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(48), prestretch=1.2, obstacles=[BALL], title="A soft pad on a ball")
@@ -28,7 +29,9 @@ PRESSURES = (0.5, 1.0, 2.0)
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/gripper"), help="folder for picture and table")
-    out = parser.parse_args(arguments).out
+    parser.add_argument("--movie", action="store_true", help="write a movie as well")
+    options = parser.parse_args(arguments)
+    out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
 
     branch = fm.trace(SCENE, start=0.1, until={"pressure": 2.0})
@@ -42,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     write_csv(out / "force.csv", ("pressure", "volume", "contact_radius", "contact_force", "pole_pressure"), rows)
     stages = [fm.equilibrium(SCENE, pressure=pressure) for pressure in PRESSURES]
     _draw(branch, stages, out / "gripper.png")
+    if options.movie:
+        view(branch, movie=out / "gripper.gif")
     _check(branch, stages)
 
 

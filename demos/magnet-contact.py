@@ -24,6 +24,7 @@ import numpy as np
 import femmembrane as fm
 from femmembrane.files import write_csv
 from femmembrane.views import plots
+from femmembrane.views.viewer import view
 
 OVER = "source.0.height"
 MAGNET = fm.Magnet(height=1.0, radius=0.5, length=0.5, strength=(3.0 * 0.5**2 * 0.5 / 4) ** 2, body=True)
@@ -75,8 +76,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     _draw(branch, path, (on, off), out / "magnet-contact.png")
     _check(branch, path, on, off)
     if options.movie:
-        from femmembrane.views.viewer import view
-
         view(path, movie=out / "magnet-contact.gif")
     print(f"The face of the magnet comes to {on.number - FACE:.4f} R0 before the membrane snaps onto it,")
     print(f"and withdraws to {off.number - FACE:.4f} R0 before the membrane lets go.")

@@ -1,15 +1,15 @@
 """A balloon between two plates that close: where it is compressed first, and whether it wrinkles there.
 
 Half a neo-Hookean ball that was inflated to a stretch, with a mirror at its equator, below a frictionless plate that comes down. Held is
-the enclosed volume, or the amount of gas in it. It is said that such a balloon wrinkles from the border of contact on. Here it does
-not. Along the plate, where the pressure of contact is P, the tensions per length obey
+the enclosed volume, or the amount of gas in it. It is said that such a balloon wrinkles from the border of contact on. In this model it
+does not. Along the plate, where the pressure of contact is P, the tensions per length obey
 
     d(rho T_1)/drho = T_2,        beyond its border    d(rho T_1 cos phi)/ds = T_2 - P rho sin phi,    phi the slope of the meridian.
 
-Contact ends tangentially, phi = 0, so that the tensions and their slopes are continuous there: only the curvature P/T_1 sets in. Flattening
-takes a cap with the circumference sin(b) to a disc with b: the rim is stretched against the pole, the pole compressed against the rim. So
-the smallest tension is that of the pole, and compression begins where the stretch at the pole falls to 1, in all directions at once, in
-balloons of a stretch below 1.024 alone. There the plate holds the membrane flat. No number of waves loses stability, and
+Contact ends tangentially, phi = 0, so that the tensions and their slopes are continuous there: only the curvature P/T_1 sets in.
+Flattening takes a cap with the circumference sin(b) to a disc with b: the rim is stretched against the pole, the pole compressed against
+the rim. So the smallest tension is that of the pole, and compression begins where the stretch at the pole falls to 1, in all directions
+at once, in balloons of a stretch below 1.024 alone. There the plate holds the membrane flat. No number of waves loses stability, and
 outside of contact no stress is ever compressive. A chamber of gas that gives way, under an atmosphere, changes numbers and not the place.
 
     python demos/plates.py             table and picture in out/plates, 15 seconds

@@ -215,6 +215,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     "seconds": Quantity("wall time spent on the equilibrium", "s"),
     "status": Quantity("how the solve ended", type=str),
     "element_ends": Quantity("ends of the elements along the meridian over R0"),
+    "mesh_ends": Quantity("ends of the elements of the equilibrium along the meridian over R0, where the mesh changes along the branch"),
+    "mesh_degree": Quantity("degree of these elements", type=int),
+    "mesh_estimated": Quantity("relative error that was estimated when this mesh was chosen"),
     "state": Quantity("displacement coefficients over R0 on the free degrees of freedom"),
     "r": Quantity("reference radius of the node over R0", label="reference radius r/R₀", si="length"),
     "s": Quantity(

@@ -4,6 +4,7 @@ Every member is asked for its state at its volume on a mesh of its own shape tha
 halved elements of two degrees more. Its own error is its distance to the state on halved elements of one degree more. ::
 
     python -m tests.promises --count 500 --accuracy 1e-6
+    python -m tests.promises --count 200 --estimates
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import femmembrane as fm
 from femmembrane.potential import potential_of
 from femmembrane.solve.controls import CONTROLS
 from femmembrane.solve.finer_space import solved_in
-from tests import population
+from tests import estimates, population
 
 #: part of the sizes of elastic and magnetic energy, and of the stress over the size, that stands for a pressure that is smaller
 SMALL = 1e-2
@@ -85,8 +86,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--accuracy", type=float, default=1e-6)
+    parser.add_argument("--estimates", action="store_true", help="how good estimated errors are, in place of promises")
     options = parser.parse_args()
     members = list(population.recorded().values())[options.first : options.first + options.count]
+    if options.estimates:
+        estimates.study(members)
+        return
     outcomes = []
     for member in members:
         outcome = promised(member, options.accuracy)

@@ -31,8 +31,8 @@ from ..stability.spectrum import SpectrumError
 from ..stability.verdict import axisymmetric_verdict
 from ..stability.zones import on_its_borders
 
-#: the degree whose stresses, from slopes that are recovered, are about as good as those of one degree more
-_RECOVERED = 3
+#: degrees whose stresses, from slopes that are recovered, are about as good as those of one degree more
+_RECOVERED = (2, 3)
 
 
 def estimate_errors(potential: Potential, x: Array, pressure: float, control: str, verdicts: Mapping[str, Verdict]) -> ErrorEstimate:
@@ -69,7 +69,7 @@ def estimate_errors(potential: Potential, x: Array, pressure: float, control: st
     own = found.evaluation.potential  # its elements may follow borders
     better, reason = _verdicts(own, found.evaluation, potential, verdicts)
     errors = _errors(control, values, _numbers(own, found.evaluation.x, found.pressure, found.evaluation, better))
-    if potential.scene.degree == _RECOVERED and finer.scene.degree == _RECOVERED + 1:
+    if potential.scene.degree in _RECOVERED and finer.scene.degree == potential.scene.degree + 1:
         errors |= _stress_errors(values, own, found, control)
     errors["displacement"] = finer.space.unit * distance(finer, found.x, transferred(potential.space, x, finer.space))
     return from_numbers(control, values, errors, method, reason)

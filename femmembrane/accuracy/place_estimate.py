@@ -16,6 +16,7 @@ from ..discretization.space import transferred
 from ..errors import Status
 from ..potential import Array, Potential, potential_of
 from ..results.error_estimate import PlaceEstimate, place_from_numbers
+from ..scene import Scene
 from ..solve.banded import BorderedFactor
 from ..solve.branch import BranchProblem, corrected, tangent_at, unit_point
 from ..solve.continuation import BranchPoint
@@ -62,6 +63,28 @@ def estimate_place(potential: Potential, x: Array, pressure: float, kind: str, a
         return place_from_numbers(values, None, method, "not estimated: the finer space has no such point near by")
     state = found.state
     return place_from_numbers(values, _numbers(finer.onto, state.x, state.pressure, state.evaluation.volume), method, "")
+
+
+def estimate_place_in(scene: Scene, potential: Potential, x: Array, pressure: float, kind: str, azimuthal: int) -> dict[str, float] | None:
+    """P, V and the height of a special point located again on the mesh of a scene; None where it is not found there.
+
+    Parameters
+    ----------
+    scene : Scene
+        On a finer mesh.
+    potential, x, pressure, kind, azimuthal
+        As for :func:`estimate_place`.
+    """
+    if kind not in _ZERO:
+        return None
+    evaluation = potential.evaluate(x, pressure)
+    point = _with_tangent(potential, State(x, pressure, evaluation, 0, 0.0, 0.0, 0.0), kind)
+    finer = _Finer(potential_of(scene), potential, point)
+    try:
+        found = finer.located(_ZERO[kind], azimuthal)
+    except SpectrumError:
+        return None
+    return None if found is None else _numbers(finer.onto, found.state.x, found.state.pressure, found.state.evaluation.volume)
 
 
 def _numbers(potential: Potential, x: Array, pressure: float, volume: float) -> dict[str, float]:

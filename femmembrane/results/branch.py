@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
@@ -314,9 +315,24 @@ class Branch(Sequence[Equilibrium]):
         return "\n".join(line.rstrip() for line in lines)
 
     @property
+    def mesh_changes(self) -> bool:
+        """Whether the mesh changes along it, as an accuracy may need: every equilibrium has the scene on its own mesh."""
+        mesh, degree = self.scene.mesh, self.scene.degree
+        if self.scene.follows_zones:
+            return False
+        return any(eq.scene.mesh is not mesh and (eq.scene.degree != degree or eq.scene.mesh != mesh) for eq in self.equilibria)
+
+    @property
     def mesh_used(self) -> str:
         """The mesh that was chosen for an accuracy, in words; empty for one that was given."""
         mesh, degree = self.scene.mesh, self.scene.degree
+        if self.mesh_changes:
+            sizes = sorted({(eq.scene.mesh.elements, eq.scene.degree) for eq in self.equilibria})
+            (fewest, _), (most, degree) = sizes[0], sizes[-1]
+            count = sum(a.scene.mesh != b.scene.mesh for a, b in pairwise(self.equilibria))
+            often = "once" if count == 1 else f"{count} times"
+            chosen = f"changed {often} along the branch for accuracy {in_words(getattr(mesh, 'accuracy', None) or 0.0)}"
+            return f"mesh: {fewest} to {most} elements of degree {degree}, graded, {chosen}"
         accuracy, estimated = (getattr(mesh, name, None) for name in ("accuracy", "estimated"))
         if accuracy is None or estimated is None:
             return ""

@@ -28,7 +28,8 @@ class ContactZone:
     body : int
         Number of the body among the obstacles of the scene; behind them come the bodies of sources.
     start, stop : float
-        Its ends along the reference meridian, over R0.
+        Its ends along the reference meridian, over R0. On a closed meridian the second is beyond the length of it where a zone goes across
+        the seam.
     reference_radii, radii : (float, float)
         Reference and deformed radii of the ends, over R0.
     force : float
@@ -123,10 +124,7 @@ class Contact:
         element, xi = space.locate(s)
         values = self._pressures[element * space.degree + np.arange(space.degree + 1)[:, None]]
         found: Array = np.einsum("qa,aq->q", space.shape_functions(xi)[0], values)
-        touched = np.zeros(s.shape, dtype=bool)
-        for zone in self.zones:
-            touched |= (s >= zone.start) & (s <= zone.stop)
-        return np.where(touched, np.maximum(found, 0.0), 0.0)
+        return np.where(self._touched(s), np.maximum(found, 0.0), 0.0)
 
     def gap(self, r: ArrayLike | None = None) -> Array:
         """Distance from the nearest body over R0, 0 in contact.
@@ -141,8 +139,15 @@ class Contact:
         s = potential.root.space.node_parameters() if r is None else np.atleast_1d(np.asarray(r, dtype=float))
         (R, Z), (u, _, w, _) = space.mesh.position(s), space.displacement(self._evaluation.x, s)
         found: Array = np.min([body.gap(R + u, Z + w) for body in potential.obstacles], axis=0)
+        return np.where(self._touched(s), 0.0, found)
+
+    def _touched(self, s: Array) -> Array:
+        """Whether there is contact at parameters of the meridian, which of a closed one come again after its length."""
+        space = self._evaluation.potential.space
+        again = float(space.ends[-1] - space.ends[0]) if space.closed else 0.0
+        found = np.zeros(s.shape, dtype=bool)
         for zone in self.zones:
-            found = np.where((s >= zone.start) & (s <= zone.stop), 0.0, found)
+            found |= ((s >= zone.start) & (s <= zone.stop)) | ((s + again >= zone.start) & (s + again <= zone.stop))
         return found
 
 
@@ -158,23 +163,28 @@ def contact_of(evaluation: Any) -> Contact:
     parameters = space.node_parameters()
     place = {int(node): k for k, node in enumerate(potential.nodes)}
     zones = []
-    for first, last in zones_of(potential, own.held):
-        held = [place[node] for node in range(first, last + 1) if node in place]
-        # next to an end that is held on the body contact goes on to that end
-        first, last = (
-            end if abs(node - end) == 1 and end not in place else node for node, end in ((first, 0), (last, parameters.size - 1))
-        )
+    count = space.degree * space.n_elements  # of places for nodes, after which those of a closed meridian come again
+    for first, last in _across_the_seam(potential, zones_of(potential, own.held), count):
+        held = [place[node % (count + 1 - space.closed)] for node in range(first, last + 1) if node in place or node >= count]
+        if not space.closed:
+            # next to an end that is held on the body contact goes on to that end
+            first, last = (end if abs(node - end) == 1 and end not in place else node for node, end in ((first, 0), (last, count)))
         body = int(own.gaps.body[held[len(held) // 2]])
         start, stop = -(-first // space.degree), last // space.degree  # elements from end to end
-        first_s, last_s = float(parameters[first]), float(parameters[last])
+        round_trips, own_last = divmod(last, count) if space.closed else (0, last)
+        first_s, last_s = float(parameters[first]), float(parameters[own_last])
         covered = 0.0
         if stop > start:
-            covered = float(area[:, start:stop].sum())
-            pressures[start * space.degree : stop * space.degree + 1] = _pressures(potential, own, area, start, stop, place)
+            elements = np.arange(start, stop) % space.n_elements
+            covered = float(area[:, elements].sum())
+            values = _pressures(potential, own, area, elements, place)
+            for k, element in enumerate(elements):
+                pressures[element * space.degree : (element + 1) * space.degree + 1] = values[k * space.degree : (k + 1) * space.degree + 1]
         s = np.array([first_s, last_s])
+        last_s += round_trips * float(parameters[-1] - parameters[0])
         (R, _), displaced = space.mesh.position(s), space.displacement(own.x, s)[0]
-        radii = np.where(np.isin([first, last], [0, parameters.size - 1]) & (np.abs(R) < 1e-12), 0.0, R + displaced)
-        at_ends = {0, parameters.size - 1, *(end * space.degree for end in ends)}
+        radii = np.where(np.isin([first, last], [0, count]) & (np.abs(R) < 1e-12), 0.0, R + displaced)
+        at_ends = {*(end * space.degree for end in ends)} if space.closed else {0, count, *(end * space.degree for end in ends)}
         forces = own.forces[held]
         zones.append(
             ContactZone(
@@ -186,28 +196,38 @@ def contact_of(evaluation: Any) -> Contact:
                 -float((forces * n_eta[held]).sum()) + 0.0,
                 float(forces.sum()),
                 covered,
-                {first, last} <= at_ends,
+                {first, own_last} <= at_ends,
                 bool(np.ptp(curvature[held]) <= _SAME_CURVATURE * np.abs(curvature[held]).max()),
             )
         )
     return Contact(tuple(zones), float(np.abs(own.gaps.gap).min()) if zones else float(own.gaps.gap.min()), own, pressures)
 
 
+def _across_the_seam(potential: ContactPotential, zones: list[tuple[int, int]], count: int) -> list[tuple[int, int]]:
+    """First and last nodes of zones. Those on both sides of the seam of a closed meridian are one, whose last node is beyond the count."""
+    known = potential.nodes
+    if not (potential.space.closed and len(zones) > 1 and zones[0][0] == known[0] and zones[-1][1] == known[-1]):
+        return zones
+    return [*zones[1:-1], (zones[-1][0], zones[0][1] + count)]
+
+
 def _pressures(
-    potential: ContactPotential, evaluation: ContactEvaluation, area: Array, start: int, stop: int, place: dict[int, int]
+    potential: ContactPotential, evaluation: ContactEvaluation, area: Array, elements: NDArray[np.int64], place: dict[int, int]
 ) -> Array:
-    """Nodal values of the pressure that has the forces on the nodes of a zone: the mass of its deformed area takes them apart."""
+    """Pressures at the nodes of neighbouring elements that have the forces there: the mass of their deformed area takes these apart."""
     space = potential.space
     value = space.shape_functions(space.points)[0]
-    degree, n = space.degree, (stop - start) * space.degree + 1
+    degree, n = space.degree, len(elements) * space.degree + 1
     mass, right = np.zeros((n, n)), np.zeros(n)
-    for element in range(start, stop):
-        k = (element - start) * degree
+    for number, element in enumerate(elements):
+        k = number * degree
         mass[k : k + degree + 1, k : k + degree + 1] += value.T @ (area[:, element, None] * value)
-    for j in range(n):
-        known = place.get(start * degree + j)
+    count = degree * space.n_elements
+    nodes = [(int(elements[0]) * degree + j) % (count if space.closed else count + 1) for j in range(n)]
+    for j, node in enumerate(nodes):
+        known = place.get(node)
         right[j] = 0.0 if known is None else evaluation.forces[known]
-    missing = [j for j in range(n) if start * degree + j not in place]  # an end that is held takes forces that nobody tells apart
+    missing = [j for j, node in enumerate(nodes) if node not in place]  # an end that is held takes forces that nobody tells apart
     kept = [j for j in range(n) if j not in missing]
     found = np.zeros(n)
     found[kept] = np.linalg.solve(mass[np.ix_(kept, kept)], right[kept])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import files
+from ..discretization.meridian import by_quantity
 from ..errors import unknown_name
 from ..quantities import heading
 from . import door
@@ -153,6 +154,15 @@ class Cost:
         """The solves that no other solve with the same start beats in both time and error: warm ones first, and the fastest first."""
         return tuple(sorted((line for line in self.lines if line.front), key=lambda line: (STARTS.index(line.start), line.milliseconds)))
 
+    @property
+    def sentence(self) -> str:
+        """What to reckon with: what a state costs at the accuracy that the scene asks for (1e-6 without one), a further digit, and effects.
+
+        Costs are those of a next load step by Newton's method, on the cheapest of the meshes that were measured. What effects add was
+        measured on the scene's own mesh, and is left out where it was not measured or not found.
+        """
+        return " ".join(part for part in (_digits(self), _additions(self)) if part)
+
     def _repr_html_(self) -> str:
         """The picture and the table, for notebooks."""
         return door.study_html(self, "Error over wall time")
@@ -205,6 +215,66 @@ class Cost:
             yield [*asdict(line).values(), machine]
 
 
+#: the accuracy that is spoken of where a scene asks for none
+_USUAL = 1e-6
+#: an addition of less than this part of a step is none that a clock tells
+_NOTICED = 0.02
+#: effects in words, and what their lines are called
+_ADDED = {
+    "azimuthal modes": "the verdict against {waves}",
+    "zones of wrinkles": "looking for zones of wrinkles",
+    "tension field": "the tension field",
+}
+
+
+def _cheapest(lines: Sequence[Measurement], error: float) -> Measurement | None:
+    """The fastest of the lines that are as accurate as this."""
+    return min((line for line in lines if line.error <= error), key=lambda line: line.milliseconds, default=None)
+
+
+def _digits(study: Cost) -> str:
+    """What an accuracy and each further digit cost."""
+    known = [line for line in study.select(what="solve", method="newton", start="warm", converged=True) if np.isfinite(line.milliseconds)]
+    accuracy = by_quantity(getattr(study.scene.mesh, "accuracy", None) or _USUAL).tightest
+    letter = heading(study.quantity)
+    chosen = _cheapest(known, accuracy)
+    if chosen is None:
+        best = min((line.error for line in known), default=np.nan)
+        return "" if np.isnan(best) else f"{letter} to {accuracy:.0e} takes more elements than were measured; the best error is {best:.0e}."
+    said = f"{letter} to {accuracy:.0e} costs {_ms(chosen.milliseconds)} a state with {chosen.elements} elements of degree {chosen.degree}"
+    floor = max(study.reference.error, min(line.error for line in known))
+    digits = int(np.floor(np.log10(accuracy / floor)))
+    last = None if digits < 1 else _cheapest(known, accuracy * 10.0**-digits)
+    if last is None:
+        return f"{said}."
+    each = (last.milliseconds - chosen.milliseconds) / digits
+    mesh = f"{last.elements} elements of degree {last.degree}"
+    more = "next to nothing" if each < _NOTICED * chosen.milliseconds else _ms(each)
+    return f"{said}; each further digit costs {more}, down to {accuracy * 10.0**-digits:.0e} with {mesh}."
+
+
+def _additions(study: Cost) -> str:
+    """What effects add to a step."""
+    effects = study.select(what="effect")
+    added = []
+    for off, on in zip(effects[::2], effects[1::2], strict=True):
+        more = on.milliseconds - off.milliseconds
+        if off.method not in _ADDED or not (off.converged and on.converged and np.isfinite(more)):
+            continue
+        waves = study.scene.analysis.azimuthal_modes or (1,)
+        name = _ADDED[off.method].format(waves=", ".join(f"n = {n}" for n in waves))
+        added.append(f"{name} adds {_ms(more) if more > _NOTICED * off.milliseconds else 'next to nothing'}")
+    if not added:
+        return ""
+    mesh = f"on {effects[0].elements} elements of degree {effects[0].degree}, where a state costs {_ms(effects[0].milliseconds)},"
+    listed = added[0] if len(added) == 1 else f"{', '.join(added[:-1])} and {added[-1]}"
+    return f"{mesh[0].upper()}{mesh[1:]} {listed}."
+
+
+def _ms(milliseconds: float) -> str:
+    return f"{milliseconds:.2g} ms" if milliseconds < 100 else f"{milliseconds:.0f} ms"
+
+
 def _absent(value: Any) -> bool:
     return value is None or (isinstance(value, float) and np.isnan(value))
 
@@ -223,6 +293,8 @@ def _text(study: Cost) -> Iterator[str]:
         f"own error {reference.error:.1g}"
     )
     yield ", ".join(study.machine.values())
+    if study.sentence:
+        yield f"\n{study.sentence}"
     yield from _element_table(study, letter)
     yield from _method_table(study, letter)
     stages, effects = study.select(what="stage"), study.select(what="effect")

@@ -10,7 +10,7 @@ of parabolas through neighbours.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, cast
 
@@ -40,6 +40,7 @@ from ..solve.state import State, joined
 from ..solve.stepping import march
 from ..threads import one_thread
 from .equilibrium import Equilibrium, recorded
+from .other_mesh import on_mesh_of
 from .special_point import Jump, SpecialPoint
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ class BranchCurve:
         self._problems: dict[int, BranchProblem] = {}
         self._readers: dict[str, Callable[[int, Equilibrium], Any]] = {}
         self.scale = _ranges(self._places(branch))
-        self.added = 0
+        self.added, self.changes = 0, branch.mesh_changes
         self.gaps = [Gap([[]]) for _ in range(max(len(branch) - 1, 0))]
         self.runs = [self._run(chain) for chain in self._chains()]
 
@@ -270,7 +271,7 @@ class BranchCurve:
 
     def _run(self, chain: list[tuple[_Place, CurvePoint]]) -> list[Piece]:
         """The pieces between the points of a chain, which also go to the gaps that they lie in."""
-        hops = [(place, piece) for (_, a), (place, b) in pairwise(chain) for piece in self._between(a, b, _HALVED)]
+        hops = [(place, piece) for (_, a), (place, b) in pairwise(chain) for piece in self._joined(a, b)]
         arcs = rounded([piece.arc for _, piece in hops])
         run = [Piece(piece.a, piece.b, arc) for (_, piece), arc in zip(hops, arcs, strict=True)]
         for ((gap, beyond), _), piece in zip(hops, run, strict=True):
@@ -279,6 +280,16 @@ class BranchCurve:
             if piece.b.special is not None and not beyond:
                 stretches.append([])
         return run
+
+    def _joined(self, a: CurvePoint, b: CurvePoint) -> list[Piece]:
+        """The curve between two points, on the mesh of the second where it changes between them."""
+        if a.node.z.size == b.node.z.size and (self.branch.over or not self.changes or self._same(a.equilibrium, b.equilibrium)):
+            return self._between(a, b, _HALVED)
+        crossing = a.special is not None and str(a.special.kind) == "branch_point"  # with another direction on each mesh
+        there = None if crossing else on_mesh_of(a.equilibrium, b.equilibrium)
+        if there is None:
+            return [Piece(a, b, chord_between(Node(b.node.z, a.node.places, None), b.node, self.scale))]
+        return self._between(replace(a, equilibrium=there, node=self._node(there)), b, _HALVED)
 
     def _between(self, a: CurvePoint, b: CurvePoint, halvings: int) -> list[Piece]:
         """The curve between two points: their arc, or the arcs through states between them where that is not close to the branch."""

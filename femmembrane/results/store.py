@@ -25,6 +25,7 @@ from .analyses import asked, known_quantity, typed_column
 from .analyses.base import Variable
 from .branch import Branch
 from .netcdf import read_dataset, reason, write_dataset
+from .ragged import stacked
 from .stored_points import (
     LIMIT,
     ON_BRANCH,
@@ -36,6 +37,7 @@ from .stored_points import (
     memory_attributes,
     memory_of,
     memory_variables,
+    mesh_variables,
     special_points_of,
     special_variables,
 )
@@ -69,14 +71,19 @@ def to_xarray(branch: Branch) -> xarray.Dataset:
     """
     import xarray
 
-    width = branch[0].state.size if len(branch) else 0
+    points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit is not None)]
+    changes, special = branch.mesh_changes, [point.equilibrium for point in points]
+    width = max((equilibrium.state.size for equilibrium in (*branch[:1], *(branch if changes else ()), *special)), default=0)
+    changes = changes or any(equilibrium.state.size != width for equilibrium in (*branch[:1], *special))
     variables = {**_table_variables(branch), **equilibrium_variables(list(branch), width, "step"), **_profile_variables(branch)}
     for analysis in asked(branch.scene):
         variables |= analysis.variables(branch)
     if branch.special_points is not None:
-        variables |= special_variables(branch.special_points, width, SPECIAL, branch.over)
-    variables |= jump_variables(branch.jumps, width, branch.over)
-    variables |= memory_variables(branch.memory)
+        variables |= special_variables(branch.special_points, width, SPECIAL, branch.over, changes)
+    if changes:
+        variables |= mesh_variables(list(branch), "step")
+    variables |= jump_variables(branch.jumps, width, branch.over, changes)
+    variables |= memory_variables(branch.memory, changes)
     described = {name: (dims, data, _describe(name)) for name, (dims, data) in variables.items()}
     coordinates = {name: described.pop(name) for name in [*described] if name in ("r", "s") or described[name][0] == (name,)}
     return xarray.Dataset(described, coords=coordinates, attrs=_attributes(branch))
@@ -205,9 +212,9 @@ def _profile_variables(branch: Branch) -> dict[str, Variable]:
     places = [key for key in ("r", "s") if key in profiles[0]]
     table = columns(branch)  # the largest electric field has the name of the field, of which there is a value at each node as well
     names = {key: f"{key}_profile" if key in table else key for key in profiles[0] if key not in places}
-    values = {name: (("step", "node"), np.array([p[key] for p in profiles])) for key, name in names.items()}
-    if any(e.scene.borders for e in branch):  # each equilibrium has its own nodes
-        return {**{key: (("step", "node"), np.array([p[key] for p in profiles])) for key in places}, **values}
+    values = {name: (("step", "node"), stacked(p[key] for p in profiles)) for key, name in names.items()}
+    if branch.mesh_changes or any(e.scene.borders for e in branch):  # each equilibrium has its own nodes
+        return {**{key: (("step", "node"), stacked(p[key] for p in profiles)) for key in places}, **values}
     return {**{key: (("node",), np.array(profiles[0][key])) for key in places}, **values}
 
 

@@ -21,6 +21,7 @@ from ..scene.variation import Parameter
 from .analyses.base import Variable
 from .equilibrium import Equilibrium
 from .path_memory import PathMemory, TraceMemory
+from .ragged import row_of, stacked
 from .special_point import Jump, SpecialPoint
 from .zones import ZONE_CHANGES, ZoneChange
 
@@ -62,7 +63,7 @@ def equilibrium_variables(equilibria: Sequence[Equilibrium], width: int, dimensi
         **{prefix + name: ((dimension,), typed(name, (getattr(e, name) for e in equilibria))) for name in scalars},
         prefix + "iterations": ((dimension,), typed("iterations", (e.iterations for e in equilibria))),
         prefix + "status": ((dimension,), typed("status", (e.status.value for e in equilibria))),
-        prefix + "state": ((dimension, "coefficient"), np.array([e.state for e in equilibria]).reshape(len(equilibria), width)),
+        prefix + "state": ((dimension, "coefficient"), stacked([e.state for e in equilibria], width)),
         **_on_branches(equilibria, width, dimension, prefix),
     }
 
@@ -75,6 +76,33 @@ def _on_branches(equilibria: Sequence[Equilibrium], width: int, dimension: str, 
     if all(e.scene.mesh == e.of_branch.scene.mesh for e in equilibria):
         return states
     return {prefix + "element_ends": ((dimension, "element_end"), np.array([e.scene.mesh.breakpoints() for e in equilibria])), **states}
+
+
+def mesh_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str = "") -> dict[str, Variable]:
+    """Where the mesh changes along the branch: the ends of the elements of each equilibrium, their degree, the error estimated there."""
+    estimated = [getattr(e.scene.mesh, "estimated", None) for e in equilibria]
+    return {
+        prefix + "mesh_ends": ((dimension, prefix + "mesh_end"), stacked(e.scene.mesh.breakpoints() for e in equilibria)),
+        prefix + "mesh_degree": ((dimension,), typed("mesh_degree", (e.scene.degree for e in equilibria))),
+        prefix + "mesh_estimated": ((dimension,), typed("mesh_estimated", (np.nan if e is None else e for e in estimated))),
+    }
+
+
+def _meshed(dataset: xarray.Dataset, scene: Scene, prefix: str) -> list[Scene]:
+    """The scene on the mesh of each equilibrium."""
+    known: dict[tuple[bytes, int, float], Scene] = {}
+    found = []
+    columns = (dataset[prefix + name].values for name in ("mesh_ends", "mesh_degree", "mesh_estimated"))
+    for row, degree, estimated in zip(*columns, strict=True):
+        ends = row_of(np.asarray(row, dtype=float))
+        key = ends.tobytes(), int(degree), float(estimated)
+        if key not in known:
+            accuracy = getattr(scene.mesh, "accuracy", None)
+            mesh = scene.mesh.on_ends(ends, accuracy, None if np.isnan(estimated) else float(estimated))
+            same = mesh == scene.mesh and int(degree) == scene.degree
+            known[key] = scene if same else scene.replace(mesh=mesh, degree=int(degree))
+        found.append(known[key])
+    return found
 
 
 def _border_variables(equilibria: Sequence[Equilibrium], dimension: str, prefix: str) -> dict[str, Variable]:
@@ -98,13 +126,12 @@ def _borders_of(dataset: xarray.Dataset, prefix: str) -> list[tuple[tuple[int, f
 def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str = "") -> list[Equilibrium]:
     """The equilibria of a scene, or of scenes that differ in the number ``over``; ``prefix`` is that of their variables."""
     count = len(dataset[prefix + "status"])
-    states = _finite(dataset, prefix + "state", count, _unknowns(scene) if count else dataset.sizes["coefficient"])
-    states.flags.writeable = False
+    scenes = _meshed(dataset, scene, prefix) if prefix + "mesh_ends" in dataset else [scene] * count
+    states = _states(dataset, prefix + "state", scenes)
     present = {"magnetic_energy": bool(scene.sources), "load_energy": bool(scene.loads), "electric_energy": scene.electric is not None}
     needed = [name for name in _SCALARS if (count and present.get(name, True)) or prefix + name in dataset]
     scalars = {name: _finite(dataset, prefix + name, count).tolist() for name in needed}
     scalars.setdefault("magnetic_energy", [0.0] * count)
-    scenes = [scene] * count
     if over:
         scenes = [Parameter(scene, over).scene_at(value) for value in _finite(dataset, prefix + over, count).tolist()]
     on_branch: list[Equilibrium | None] = [None] * count
@@ -133,19 +160,39 @@ def equilibria_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: str 
     ]
 
 
-def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str, over: str) -> dict[str, Variable]:
-    """What :func:`special_points_of` needs to build the records again, their equilibria included, over a number or none."""
+def _states(dataset: xarray.Dataset, name: str, scenes: Sequence[Scene]) -> list[Array]:
+    """States of scenes, each as long as its mesh says."""
+    widths = [_unknowns(scene) for scene in scenes]
+    if len(set(widths)) < 2 and (not widths or dataset.sizes["coefficient"] == widths[0]):
+        rows = _finite(dataset, name, len(scenes), widths[0] if widths else dataset.sizes["coefficient"])
+        rows.flags.writeable = False
+        return list(rows)
+    states = [np.array(row_of(row)) for row in dataset[name].values]
+    for state, width in zip(states, widths, strict=True):
+        if state.shape != (width,) or not np.isfinite(state).all():
+            raise ValueError(f"{name} are no finite numbers, as many as the meshes have unknowns")
+        state.flags.writeable = False
+    return states
+
+
+def special_variables(points: Sequence[SpecialPoint], width: int, prefix: str, over: str, changes: bool = False) -> dict[str, Variable]:
+    """What :func:`special_points_of` needs to build the records again, their equilibria included, over a number or none; ``changes`` says
+    that their meshes may differ.
+    """
     dimension = prefix + "point"
     numbers = {prefix + name: ((dimension,), typed(name, (getattr(p, name) for p in points))) for name in _SPECIAL_NUMBERS}
     kinds: dict[str, Variable] = {prefix + "kind": ((dimension,), typed("kind", (str(p.kind) for p in points)))}
     tangents: dict[str, Variable] = {}
     if any(p.tangent is not None for p in points):
-        none = np.full(width + 1, np.nan)
-        tangents[prefix + "tangent"] = (dimension, "unknown"), np.array([none if p.tangent is None else p.tangent for p in points])
+        none = np.full(0, np.nan)
+        rows = stacked([none if p.tangent is None else p.tangent for p in points], width + 1)
+        tangents[prefix + "tangent"] = (dimension, "unknown"), rows
     states = equilibrium_variables([p.equilibrium for p in points], width, dimension, prefix + "equilibrium_")
     own: dict[str, Variable] = {}
     if over:
         own[f"{prefix}equilibrium_{over}"] = (dimension,), typed(over, (p.equilibrium.number(over) for p in points))
+    if changes:
+        own |= mesh_variables([p.equilibrium for p in points], dimension, prefix + "equilibrium_")
     return {**kinds, **own, **numbers, **tangents, **_zone_variables(points, dimension, prefix), **states}
 
 
@@ -178,24 +225,24 @@ def special_points_of(dataset: xarray.Dataset, scene: Scene, over: str, prefix: 
     # younger than the format, and only where there are branch points
     tangents: list[Array | None] = [None] * len(kinds)
     if prefix + "tangent" in dataset:
-        rows = np.array(dataset[prefix + "tangent"].values, dtype=np.float64)
-        tangents = [row if np.isfinite(row).all() else None for row in rows]
+        rows = [np.array(row_of(row)) for row in dataset[prefix + "tangent"].values]
+        tangents = [row if row.size == e.state.size + 1 and np.isfinite(row).all() else None for row, e in zip(rows, states, strict=True)]
     return tuple(
         SpecialPoint(kind=k, **dict(zip(_SPECIAL_NUMBERS, n, strict=True)), equilibrium=e, over=over, tangent=t, zone=z)
         for k, n, e, t, z in zip(kinds, numbers, states, tangents, _zones_of(dataset, prefix, len(kinds)), strict=True)
     )
 
 
-def memory_variables(memory: PathMemory | None) -> dict[str, Variable]:
-    """The path that predicts the next equilibrium."""
+def memory_variables(memory: PathMemory | None, changes: bool = False) -> dict[str, Variable]:
+    """The path that predicts the next equilibrium. Where the mesh changes it is one of the last mesh."""
     if memory is None:
         return {}
     border = memory.border if isinstance(memory, TraceMemory) else None
     return {
         **({} if border is None else {"trace_border": (("coefficient",), border)}),
         "trace_sigma": (("trace",), np.array(memory.sigma)),
-        "trace_point": (("trace", "unknown"), memory.points),
-        "trace_slope": (("trace", "unknown"), memory.slopes),
+        "trace_point": (("trace", "trace_unknown" if changes else "unknown"), memory.points),
+        "trace_slope": (("trace", "trace_unknown" if changes else "unknown"), memory.slopes),
     }
 
 
@@ -205,27 +252,34 @@ def memory_of(dataset: xarray.Dataset) -> PathMemory | None:
         return None
     sigma = _finite(dataset, "trace_sigma", dataset.sizes["trace"])
     shape = len(sigma), dataset.sizes["coefficient"] + (2 if "trace_border" in dataset else 1)
+    if "trace_unknown" in dataset.sizes:
+        shape = len(sigma), dataset.sizes["trace_unknown"]
     points, slopes = (_finite(dataset, name, *shape) for name in ("trace_point", "trace_slope"))
+    sizes = None
+    if "mesh_sizes" in dataset.attrs:
+        pressure, eigenvalues = map(float, json.loads(str(dataset.attrs["mesh_sizes"])))
+        sizes = pressure, eigenvalues
     if "trace_step" not in dataset.attrs:
-        return PathMemory(tuple(sigma.tolist()), points, slopes)
+        return PathMemory(tuple(sigma.tolist()), points, slopes, sizes=sizes)
     unexplained = tuple(map(str, json.loads(dataset.attrs.get("trace_unexplained", "[]"))))
     step, regular = float(dataset.attrs["trace_step"]), int(dataset.attrs["trace_regular"])
     if not (len(sigma) and 0 < step < np.inf and 1 <= regular <= dataset.sizes["step"]):
         raise ValueError("the memory of the trace does not belong to it")
     known = float(dataset.attrs.get("trace_known", 0.0))
     border = _finite(dataset, "trace_border", dataset.sizes["coefficient"]) if "trace_border" in dataset else None
-    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained, known, border)
+    return TraceMemory(tuple(sigma.tolist()), points, slopes, step, regular, unexplained, known, border, sizes=sizes)
 
 
 def memory_attributes(memory: PathMemory | None) -> dict[str, Any]:
     """What a trace remembers beside the points of its path."""
+    sizes = {} if memory is None or memory.sizes is None else {"mesh_sizes": json.dumps(memory.sizes)}
     if not isinstance(memory, TraceMemory):
-        return {}
+        return sizes
     unexplained = {"trace_unexplained": json.dumps(memory.unexplained)} if memory.unexplained else {}
-    return {"trace_step": memory.step, "trace_regular": memory.regular, "trace_known": memory.known, **unexplained}
+    return {"trace_step": memory.step, "trace_regular": memory.regular, "trace_known": memory.known, **unexplained, **sizes}
 
 
-def jump_variables(jumps: Sequence[Jump], width: int, over: str) -> dict[str, Variable]:
+def jump_variables(jumps: Sequence[Jump], width: int, over: str, changes: bool = False) -> dict[str, Variable]:
     """Where a run snapped, and the folds before."""
     if not jumps:
         return {}
@@ -234,7 +288,7 @@ def jump_variables(jumps: Sequence[Jump], width: int, over: str) -> dict[str, Va
         "jump_index": (("jump",), typed("jump_index", (jump.index for jump in jumps))),
         "jump_limit": (("jump",), typed("jump_limit", (jump.limit is not None for jump in jumps))),
         "jump_held": (("jump",), typed("jump_held", (jump.held for jump in jumps))),
-        **special_variables(limits, width, LIMIT, over),
+        **special_variables(limits, width, LIMIT, over, changes),
     }
 
 

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 SPECIAL_POINT_COLUMNS = ("kind", "volume", "pressure", "center_height", "error")
 #: what every scene has at the end of its tables
 _LAST = ("residual", "iterations", "seconds")
+#: the mesh of an equilibrium, where it changes along the branch
+_OF_MESH = ("elements", "degree")
 
 
 def columns(branch: Branch) -> list[str]:
@@ -35,7 +37,7 @@ def columns(branch: Branch) -> list[str]:
 
     Behind the step stands the number of the scene that changes along the branch, if one does. Between those that every branch has stand
     ``magnetic_energy`` when the scene has sources, ``load_energy`` when it has loads, ``electric_energy`` when it has
-    electrodes, and the columns of the analyses that the scene asks for.
+    electrodes, the columns of the analyses that the scene asks for, and ``elements`` and ``degree`` where the mesh changes.
     """
     scene = branch.scene
     return [
@@ -47,6 +49,7 @@ def columns(branch: Branch) -> list[str]:
         *(["electric_energy"] if scene.electric else []),
         *(["gas"] if scene.chamber else []),
         *(name for analysis in asked(scene) for name in analysis.columns(scene)),
+        *(_OF_MESH if branch.mesh_changes else ()),
         *_LAST,
     ]
 
@@ -62,6 +65,8 @@ def reader(scene: Scene, column: str) -> Callable[[int, Equilibrium], Cell]:
     if own:
         value = own[0].value
         return lambda step, equilibrium: value(equilibrium, column)
+    if column in _OF_MESH:
+        return lambda step, equilibrium: int(equilibrium.scene.mesh.elements if column == "elements" else equilibrium.scene.degree)
     if column == "gas":
         return lambda step, equilibrium: equilibrium.gas_amount
     if "." in column:
@@ -76,7 +81,7 @@ def known_columns(branch: Branch) -> list[str]:
     Verdicts against azimuthal perturbations of any number of waves are left out of the list.
     """
     more = (name for analysis in ANALYSES for name in analysis.more_columns())
-    return list(dict.fromkeys([*columns(branch), *names(branch.scene), "magnetic_energy", "load_energy", "status", *more]))
+    return list(dict.fromkeys([*columns(branch), *names(branch.scene), "magnetic_energy", "load_energy", "status", *_OF_MESH, *more]))
 
 
 def column(branch: Branch, name: str) -> NDArray[Any]:

@@ -53,6 +53,10 @@ _SAME_CURVATURE = 1e-6
 _PULL, _INSIDE = 1e-3, 1e-6
 
 
+#: share of a segment on either side of a corner at which its smooth parts end
+_BESIDE = 1e-6
+
+
 class Once(Protocol):
     """A corrector on a smooth potential; ``damped`` for a guess that is not next to a solution."""
 
@@ -150,7 +154,8 @@ def _with_borders(once: Once, control: Control, root: ContactPotential, result: 
     """The equilibrium with ends of elements at the borders of contact; None where there are none that ends could follow."""
     evaluation = cast("ContactEvaluation", result.evaluation)
     zones = [(zone, np.array(_estimates(root, evaluation, zone))) for zone in zones_of(root, evaluation.held)]
-    zones = [(zone, places) for zone, places in zones if places.size and _smooth_about(root, evaluation, zone)]
+    zones = [(zone, places) for zone, places in zones if places.size and not _ends_at_seam(root, evaluation.held, zone)]
+    zones = [(zone, places) for zone, places in zones if _smooth_about(root, evaluation, zone)]
     followed = [(zone, places) for zone, places in zones if _assigned(root, [zone], places) is not None]
     if not followed or _assigned(root, [z for z, _ in followed], np.concatenate([s for _, s in followed])) is None:
         return None
@@ -203,6 +208,12 @@ def _sides(root: ContactPotential, zone: tuple[int, int]) -> list[bool]:
     """The borders of a zone: False for that at its beginning, True for that at its end; an end of the meridian is none."""
     known = set(root.nodes.tolist())
     return [side for side, beyond in ((False, zone[0] - 1), (True, zone[1] + 1)) if beyond in known]
+
+
+def _ends_at_seam(root: ContactPotential, held: Mask, zone: tuple[int, int]) -> bool:
+    """Whether contact ends at the seam of a closed meridian, where no end of an element follows it."""
+    first, last = int(root.nodes[0]), int(root.nodes[-1])
+    return root.space.closed and ((zone[0] == first and not held[-1]) or (zone[1] == last and not held[0]))
 
 
 def _smooth_about(root: ContactPotential, evaluation: ContactEvaluation, zone: tuple[int, int]) -> bool:
@@ -470,6 +481,29 @@ def contact_events(segment: Segment[Any]) -> list[Located[Any]]:
         before, after = pressed(segment.a), pressed(segment.b)
         if before * after < 0 or (after == 0 and before != 0):
             found.append(segment.root("touch" if after > before else "release", pressed, 0.0, 1.0))
+    return found
+
+
+def folds_beside(segment: Segment[Any], kind: str, events: list[Located[Any]]) -> list[Located[Any]]:
+    """The folds of a kind on a segment whose branch has corners: those of its smooth parts, and a corner on whose sides a rate has other
+    signs.
+
+    A cubic through both ends knows nothing of a fold just before a corner, beyond which the quantity turns again.
+    """
+    if not events:
+        return segment.folds(kind)
+    shares = sorted({(event.point.sigma - segment.a.sigma) / segment.length for event in events})
+    ends = [0.0, *(share + side * _BESIDE for share in shares for side in (-1, 1)), 1.0]
+    if not all(low < high for low, high in pairwise(ends)):
+        return segment.folds(kind)
+    points = [segment.at(share) for share in ends]
+    found: list[Located[Any]] = []
+    for low, high in zip(points[::2], points[1::2], strict=True):
+        found += type(segment)(segment.problem, low, high).folds(kind)
+    quantity = segment.problem.folds[kind]
+    for before, after, event in zip(points[1::2], points[2::2], sorted(events, key=lambda e: e.point.sigma), strict=False):
+        if before.rate(quantity) * after.rate(quantity) < 0:
+            found.append(type(event)(kind, event.point, event.error))
     return found
 
 

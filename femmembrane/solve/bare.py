@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Potential, potential_of
-from .controls import CONTROLS, PressureControl, VolumeControl
+from .controls import CONTROLS, Control, PressureControl, VolumeControl
 from .homotopy import Held, follow_homotopy
 from .newton import correct
 from .state import State, flat_state
@@ -156,6 +156,19 @@ def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
         if landed is None:
             raise
         return landed
+
+
+def stopped(potential: Potential, control: Control, left: State) -> State | None:
+    """Where bodies stop a membrane that snaps from a state: downhill from there, or from a bare membrane on either side of rest."""
+
+    def states() -> Iterator[State]:
+        yield left
+        for side in (1.0, -1.0):
+            with suppress(SolveError):
+                yield inflated(potential, potential.space.reference_volume + side * moderate(potential))
+
+    found = caught(potential, control, states())
+    return found if found is not None and sound(found) else None
 
 
 def _off_bodies(potential: ContactPotential, state: State) -> State | None:

@@ -219,7 +219,8 @@ def rounded(arcs: Sequence[Arc]) -> list[Arc]:
     arcs = list(arcs)
     for k in range(len(arcs) - 1):
         before, after = arcs[k], arcs[k + 1]
-        if before.b.direction is not None or before.b.corner or not min(before.length, after.length) > 0:
+        apart = before.b is not after.a or before.b.direction is not None or before.b.corner
+        if apart or not min(before.length, after.length) > 0:
             continue
         share = before.length / (before.length + after.length)
         slope, rate = (

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import SolveError, Status
 from ..potential import Array, Potential
-from .bare import moderate
+from .bare import moderate, stopped
 from .continuation import BranchPoint
 from .controls import CONTROLS, Controlled
 from .minimize import is_minimum, minimize_and_verify
@@ -20,7 +20,7 @@ from .start import cold_start, start_at_volume
 from .state import Predictor, State, at_rest, distance, flat_state, rests_flat
 from .state_resolution import refuse_unresolved
 from .stepping import Corrector, march
-from .ways import DOWNHILL, caught
+from .ways import DOWNHILL
 from .wellposed import ill_posed, slackness, unresolved_source
 
 #: who solves, by the public name
@@ -274,7 +274,7 @@ class LoadPath:
         snapped = None
         left = limit.fold.point.state if limit.fold else self.state
         if jump and limit.landing is None and left is not None and self.potential.obstacles and self.held in DOWNHILL:
-            snapped = caught(self.potential, self.held.at(load), (left,))
+            snapped = stopped(self.potential, self.held.at(load), left)
             limit = replace(limit, landing=snapped)
         turn = Turn(limit)
         if limit.fold is None and limit.ill_posed is not None and limit.landing is None:

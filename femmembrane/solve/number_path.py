@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..errors import SolveError, Status
 from ..potential import Family, Potential, potential_of
-from .bare import moderate
+from .bare import moderate, stopped
 from .branch import BranchProblem, first_point
 from .controls import ArcLengthControl, Control, Controlled, GasOver, at_number, is_held
 from .load_path import SOLVERS, LoadPath, NumberTurn, Turn
@@ -19,7 +19,7 @@ from .segment import Located
 from .state import Predictor, State
 from .state_resolution import refuse_unresolved
 from .stepping import march
-from .ways import DOWNHILL, caught
+from .ways import DOWNHILL
 from .wellposed import ill_posed, slackness, unresolved_source
 
 #: most steps along the branch of one scene on which a stable state is looked for
@@ -154,7 +154,7 @@ class NumberPath:
         snapped = None
         if jump and limit.landing is None and self.family.obstacles and self.held in DOWNHILL:
             left = limit.fold.point.state if limit.fold else last
-            snapped = caught(self._member(load, built=True), self.held.at(self.value), (left,))
+            snapped = stopped(self._member(load, built=True), self.held.at(self.value), left)
             limit = limit if snapped is None else replace(limit, landing=self._here(snapped, load))
         turn = NumberTurn(limit, self.name)
         if limit.fold is None and limit.ill_posed is not None and limit.landing is None:

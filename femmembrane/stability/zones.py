@@ -30,6 +30,7 @@ from ..discretization.space import Space, space_of_scene
 from ..potential import potential_of
 from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
+from ..results.other_mesh import on_mesh_of
 from ..results.zones import KINDS, Zone, Zones, ZonesAlong
 from ..scene import WRINKLING, Scene
 from ..solve.end_strains import strains_at_ends
@@ -106,7 +107,8 @@ def zones_along(branch: Branch) -> ZonesAlong:
         if id(b) in landings:
             snaps.add(len(zones))
         else:
-            for t, between in _changing(a.of_branch, b.of_branch, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS):
+            first = on_mesh_of(a.of_branch, b.of_branch) if a.of_branch.state.size != b.of_branch.state.size else a.of_branch
+            for t, between in _changing(first or b.of_branch, b.of_branch, (0.0, a.zones()), (1.0, b.zones()), _HALVINGS):
                 steps.append(k + t)
                 zones.append(between)
         steps.append(k + 1.0)

@@ -37,6 +37,8 @@ from ..stability.checked_verdict import checked_verdict
 from ..stability.zones import find_zones
 from ..threads import one_thread
 from .arguments import check_scene
+from .load_run import LoadRequest
+from .meshing import on_chosen_mesh
 from .state_records import record
 
 #: arguments of a study that takes seconds
@@ -84,7 +86,7 @@ def cost(
     Parameters
     ----------
     scene : Scene
-        Stages and effects are measured on its own mesh.
+        Stages and effects are measured on its own mesh, or on the one that is chosen for the accuracy that it asks for.
     volume, pressure, center_height : float
         Exactly one of them. No minimiser holds a height: IPOPT is then left out.
     degrees, elements : sequence of int
@@ -140,6 +142,8 @@ def cost(
     _known("tolerances", [m for m in methods if m not in tolerances], ())
     if not CONTROLS[control].minimised:
         solvers = [s for s in solvers if s != "ipopt"]
+    if scene.open:
+        scene = on_chosen_mesh(scene, LoadRequest(CONTROLS[control], np.array([load]), solver="newton")).scene
     course = Course(scene, control, load, step, max(reference_elements, *elements))
     if "ipopt" in solvers and len(degrees) * len(elements) > work.most_meshes():
         allowed = f"no more than {work.most_meshes()} meshes (degrees times elements) are allowed with IPOPT, which keeps so many problems"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..checks import sign
+from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
-from ..potential import Array, Evaluation, Family, Potential
+from ..potential import Array, Evaluation, Family, Potential, potential_of
+from ..results.branch import Branch
 from ..results.equilibrium import Equilibrium
 from ..results.folds import Cusp, FoldCurve
 from ..results.special_point import SpecialPoint
@@ -29,6 +32,9 @@ from .arguments import check_ill_posed, check_max_steps, check_scene
 from .over_number import family_of
 from .running import End, Run
 from .state_records import record
+
+if TYPE_CHECKING:
+    from ..accuracy.along import Shortfall
 
 #: rate of the fold's own quantity along the curve below which it counts as stationary too: two folds of this kind merge there
 _STATIONARY = 1e-6
@@ -59,7 +65,8 @@ def fold_curve(
     scene : Scene
         The scene of ``start``.
     start : SpecialPoint
-        Of kind limit_point or volume_fold, from :func:`femmembrane.trace`.
+        Of kind limit_point or volume_fold, from :func:`femmembrane.trace`. Where the scene asks for an accuracy it may be one on any mesh:
+        it is located again on the mesh that is chosen for the curve.
     parameter : str
         ``source.K.strength``, ``source.K.height`` (K from 0), ``membrane.susceptibility``, or a number of the material. Ogden's material
         has ``material.mu.K`` and ``material.alpha.K``, and the sum of mu alpha stays 2: with ``mu`` the other moduli are scaled by one
@@ -84,7 +91,7 @@ def fold_curve(
     Raises
     ------
     InputError, SolveError
-        A SolveError carries the curve up to the failure as ``result``.
+        A SolveError carries the curve up to the failure as ``result``; without one when no mesh meets the accuracy.
 
     Examples
     --------
@@ -103,7 +110,15 @@ def fold_curve(
     check_ill_posed(ill_posed)
     check_max_steps(max_steps)
     request = FoldRequest(start, named, (low, high), direction, int(max_steps), steps or _STEPS, ill_posed)
-    curve = FoldRun(scene, request).follow()
+    clock, shortfall = time.perf_counter(), None
+    if scene.open:
+        scene, request, shortfall = _on_chosen_mesh(scene, request)
+    run = FoldRun(scene, request)
+    run.timings, run.shortfall = (
+        {**({"mesh": time.perf_counter() - clock} if scene.mesh != named.scene.mesh else {}), **run.timings},
+        shortfall,
+    )
+    curve = run.follow()
     if throw and curve.message:
         raise SolveError(curve.message, status=curve.status, result=curve)
     return curve
@@ -136,6 +151,38 @@ class FoldRequest:
     max_steps: int
     steps: StepControl
     ill_posed: str
+
+    def on(self, scene: Scene) -> FoldRequest:
+        """The request on the mesh of a scene, with its start carried over."""
+        named = Parameter(scene, self.parameter.name)
+        eq = self.start.equilibrium.of_branch if isinstance(self.start, SpecialPoint) else None
+        if eq is None or eq.scene.mesh.shape != scene.mesh.shape:
+            return replace(self, parameter=named)
+        there = replace(eq, scene=scene, state=transferred(eq.potential.space, eq.state, potential_of(scene).space), _answers={})
+        return replace(self, parameter=named, start=replace(self.start, equilibrium=there))
+
+
+def _on_chosen_mesh(scene: Scene, request: FoldRequest) -> tuple[Scene, FoldRequest, Shortfall | None]:
+    """The scene on a mesh that keeps its accuracy along the curve, the request there, and where the accuracy ends.
+
+    Raises
+    ------
+    SolveError
+        When no mesh meets the accuracy, or the curve yields nothing on a trial mesh.
+    """
+    from ..accuracy.along import choose_and_check
+
+    def follow(on: Scene) -> Branch:
+        curve = FoldRun(on, request.on(on)).follow()
+        return Branch(on, curve.equilibria, curve.status, curve.message)
+
+    chosen, shortfall, _ = choose_and_check(scene, follow, "arc-length")
+    request = request.on(chosen)
+    if shortfall is None:
+        return chosen, request, None
+    if shortfall.kept < 2:
+        raise SolveError(str(shortfall), status=Status.ACCURACY_NOT_MET)
+    return chosen, replace(request, max_steps=shortfall.kept - 1), shortfall
 
 
 class FoldRun(Run[FoldCurve]):
@@ -173,6 +220,8 @@ class FoldRun(Run[FoldCurve]):
         self.add(self.point)
 
     def step(self) -> End | None:
+        if self.made == self.request.max_steps and self.shortfall is not None:
+            return Status.ACCURACY_NOT_MET, str(self.shortfall)
         if self.made == self.request.max_steps:
             return Status.STEP_LIMIT, f"{self.made} steps were made without meeting a bound of {self.parameter.name}"
         self.made += 1

@@ -29,6 +29,8 @@ _FOLLOWED = {"volume": "volume", "pressure": "pressure", "height": "center_heigh
 _STRIDES = StepControl(largest=1.0, deviation=2e-3)
 #: a slider spans these multiples of a number, and this much about zero
 _SPAN, _ABOUT_ZERO = 2.0, 1.0
+#: times that the way to an end of that range is halved where the scene cannot take it
+_HALVED = 6
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,8 @@ class LiveScene:
     def sliders(self) -> list[Slider]:
         """One for every number of the scene that can vary, except the one that its run varies."""
         varied = self._run.number
-        return [_slider(Parameter(self.scene, name)) for name in names(self.scene) if name != varied]
+        found = (_slider(Parameter(self.scene, name)) for name in names(self.scene) if name != varied)
+        return [slider for slider in found if slider.low < slider.high]
 
     @property
     def elements(self) -> int | None:
@@ -147,7 +150,20 @@ class LiveScene:
 def _slider(number: Parameter) -> Slider:
     value = number.value
     low, high = sorted((value / _SPAN, value * _SPAN)) if value else (-_ABOUT_ZERO, _ABOUT_ZERO)
-    return Slider(number.name, value, low, high)
+    return Slider(number.name, value, _reached(number, low), _reached(number, high))
+
+
+def _reached(number: Parameter, end: float) -> float:
+    """The end of a range, or what of the way to it the scene can take: a body comes no nearer than the membrane at rest."""
+    value = number.value
+    for k in range(_HALVED):
+        there = value + (end - value) / 2**k
+        try:
+            number.scene_at(there)
+        except InputError:
+            continue
+        return there
+    return value
 
 
 def _error(branch: Branch) -> float:

@@ -10,8 +10,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..accuracy.adapt import Along, spread
+from ..accuracy.along import Along
 from ..accuracy.borders import holding
+from ..accuracy.yardstick import spread
 from ..checks import LARGEST, choice
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -80,6 +81,9 @@ class LoadRequest(Request):
 
     def trial(self) -> Self:
         return replace(self, loads=self.loads[spread(self.loads)], throw=False)
+
+    def covers(self, whole: Request) -> bool:
+        return isinstance(whole, LoadRequest) and len(self.loads) == len(whole.loads)
 
     def up_to(self, count: int) -> Self:
         return replace(self, loads=self.loads[: spread(self.loads)[count - 1] + 1])
@@ -205,8 +209,9 @@ class LoadRun(Run[Branch]):
         """
         if not state.x.any():
             return state
+        along = along.reached(self.found, state)
         share = along.share(self.potential, state)
-        if along.full(share):
+        if along.full(self.here, share):
             scene = self._mesh_for(along, state, share)
         else:
             scene = along.smaller(self.here, self.potential, state, share) if len(self.found) % _OFTEN == 0 else None
@@ -224,7 +229,7 @@ class LoadRun(Run[Branch]):
         try:
             return along.mesh_for(self.here, self.potential, state, share)
         except SolveError:
-            if share > 1:
+            if share > along.most:
                 raise
             return None
 

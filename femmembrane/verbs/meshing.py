@@ -15,7 +15,7 @@ from ..scene import Scene
 from .arguments import check_scene
 
 if TYPE_CHECKING:
-    from ..accuracy.adapt import Along, Shortfall
+    from ..accuracy.along import Along, Shortfall
     from .running import Request
 
 S = TypeVar("S")
@@ -67,11 +67,12 @@ def on_chosen_mesh(scene: Scene, request: Request) -> Chosen:
     if kept is not None and getattr(kept.mesh, "accuracy", None) == getattr(scene.mesh, "accuracy", None):
         return Chosen(scene.replace(mesh=kept.mesh, degree=kept.degree), request)
     clock = time.perf_counter()
-    from ..accuracy.adapt import choose_and_check
+    from ..accuracy.along import choose_and_check
 
     trial = request.trial()
     changes = request.mesh_changes and not (scene.bodies or scene.follows_zones)
-    chosen, shortfall, along = choose_and_check(scene, lambda on: trial.on(on).begin(on).follow(), request.errors_at, changes)
+    every = trial.covers(request)
+    chosen, shortfall, along = choose_and_check(scene, lambda on: trial.on(on).begin(on).follow(), request.errors_at, changes, every)
     if shortfall is not None and not shortfall.kept:
         raise SolveError(str(shortfall), status=Status.ACCURACY_NOT_MET)
     request = (request if shortfall is None else request.up_to(shortfall.kept)).on(chosen)

@@ -21,7 +21,7 @@ from ..solve.state import State
 from .state_records import OnCheckpoint, OnStep
 
 if TYPE_CHECKING:
-    from ..accuracy.adapt import Along, Shortfall
+    from ..accuracy.along import Along, Shortfall
     from .meshing import Chosen
 
 #: the record of a run
@@ -55,6 +55,10 @@ class Request(ABC):
     @abstractmethod
     def trial(self) -> Self:
         """What stands for the request when a mesh is tried."""
+
+    def covers(self, whole: Request) -> bool:
+        """Whether this request, which stands for another one in trials, has all of its equilibria."""
+        return True
 
     @abstractmethod
     def up_to(self, count: int) -> Self:
@@ -139,7 +143,7 @@ class Timed:
         self._clock = time.perf_counter()
 
     def __exit__(self, *error: object) -> None:
-        self._timings[self._stage] += time.perf_counter() - self._clock
+        self._timings[self._stage] = self._timings.get(self._stage, 0.0) + time.perf_counter() - self._clock
 
 
 def carry_out(

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias, cast
 
 import numpy as np
 
-from ..accuracy.adapt import Along
+from ..accuracy.along import Along
 from ..accuracy.borders import Solve, holding
 from ..checks import choice, is_number, number, sign, store
+from ..discretization.meridian import in_words
 from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -23,7 +24,7 @@ from ..results.special_point import SpecialPoint
 from ..scene import ALL, Scene
 from ..scene.run import GAS, HELD
 from ..solve import state_resolution, wellposed
-from ..solve.active_set import contact_events
+from ..solve.active_set import contact_events, folds_beside
 from ..solve.bare import usual_volume
 from ..solve.branch import BranchProblem, first_point, oriented_point
 from ..solve.contact import Watch, stopped_by_source
@@ -354,12 +355,12 @@ class TraceRun(Run[Branch]):
         last = min(met, key=lambda p: p.sigma, default=None)
         unresolved = state_resolution.unresolved(self.potential_at(last or new), self.own((last or new).state))
         share = self._share(last or new, bool(unresolved))
-        if self.along is not None and before is not None and share > 1:
+        if self.along is not None and before is not None and share > self.along.most:
             return self._step_again(self.along, before, last or new, share)
         if unresolved:
             return Status.NOT_RESOLVED, f"at {self.place(last or new)} {unresolved}"
-        if share > 1:
-            return Status.ACCURACY_NOT_MET, f"beyond {self.place(self.point)} no mesh keeps the accuracy of a step"
+        if self.along is not None and share > self.along.most:
+            return self._not_met(f"the error is {share:.1f} times as large, on the mesh that was chosen for it")
         self._again = False
         closing = self._look_for_special_points(segment, last)
         last = closing or last
@@ -380,23 +381,32 @@ class TraceRun(Run[Branch]):
         """The estimated error of a point over the accuracy that is asked for, where the mesh may change for it."""
         if self.along is None:
             return 0.0
-        return np.inf if unresolved else self.along.share(self.potential, point.state)
+        with self.timed("mesh"):
+            return np.inf if unresolved else self.along.reached(self.found, point.state).share(self.potential, point.state)
 
     def _step_again(self, along: Along, before: Tracer, beyond: BranchPoint, share: float) -> End | None:
         """Stand where the step set out, on a mesh for the point that it led to; the end where there is none."""
         try:
-            scene = along.mesh_for(self.here, self.potential, beyond.state, share)
+            scene = along.reached(self.found, beyond.state).mesh_for(self.here, self.potential, beyond.state, share)
             self.tracer, self._again = before, True
             self._go_over(scene)
         except SolveError as error:
-            return Status.ACCURACY_NOT_MET, f"beyond {self.place(self.point)} {error}"
+            return self._not_met(str(error))
         self.made -= 1
         return None
 
+    def _not_met(self, why: str) -> End:
+        """The end where no mesh keeps the accuracy."""
+        state = self.point.state
+        asked = in_words(getattr(self.here.mesh, "accuracy", None) or 0.0)
+        kept = f"it is kept up to V = {state.volume:.6g}, P = {state.pressure:.6g}; at the next equilibrium {why}"
+        return Status.ACCURACY_NOT_MET, f"mesh.accuracy = {asked} is not met all along: {kept}"
+
     def _change_mesh(self, along: Along, share: float) -> None:
         """Another mesh for the steps to come, where this one is nearly used up or much too fine; the same one where there is none."""
-        with contextlib.suppress(SolveError):
-            if along.full(share):
+        along = along.reached(self.found, self.point.state)
+        with self.timed("mesh"), contextlib.suppress(SolveError):
+            if along.full(self.here, share):
                 self._go_over(along.mesh_for(self.here, self.potential, self.point.state, share), alike=True)
             elif self.regular % _OFTEN == 0 and (smaller := along.smaller(self.here, self.potential, self.point.state, share)) is not None:
                 self._go_over(smaller, alike=True)
@@ -417,7 +427,7 @@ class TraceRun(Run[Branch]):
         state.iterations += self.found[-1].iterations
         new = record(scene, onto, state)
         store(new, seconds=self.found[-1].seconds)
-        self.found[-1] = new
+        self.found = [*self.found[:-1], new]  # another list: a checkpoint that was taken keeps the one before
 
     def _stand_on(self, scene: Scene) -> None:
         """Have the mesh of a scene from here on."""
@@ -487,9 +497,10 @@ class TraceRun(Run[Branch]):
         if self.special is None:
             return None
         with self.timed("special_points"):
-            located = [fold for kind in self.problem.folds for fold in segment.folds(kind)]
+            events = contact_events(segment)
+            located = [fold for kind in self.problem.folds for fold in folds_beside(segment, kind, events)]
             crossed = self.crossed(segment)
-            located += [*crossed, *contact_events(segment), *self._zone_events(segment)]
+            located += [*crossed, *events, *self._zone_events(segment)]
             for fold in sorted(located, key=lambda f: f.point.sigma):
                 if last is None or fold.point.sigma <= last.sigma:
                     self.special.append(self._special(fold))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,8 @@ _METHODS: dict[str, tuple[str, Any, str]] = {
     "published": ("*", (0, (1, 3)), "shooting as published"),
 }
 _DARK = "#222222"
+#: letters of a title in an inch
+_LETTERS = 13.0
 
 
 def plot_cost(study: Cost, path: str | PathLike[str] | None = None, *, ax: Axes | None = None, start: str | None = None) -> Figure | Axes:
@@ -85,7 +88,8 @@ def plot_cost(study: Cost, path: str | PathLike[str] | None = None, *, ax: Axes 
     }
     figure.legend(list(entries.values()), list(entries), loc="outside lower center", **look)
     title = f"{title_text(study.scene.title)}, " if study.scene.title else ""
-    figure.suptitle(f"{title}{heading(study.control)} = {study.load:.6g}", fontsize=11, wrap=True, parse_math=False)
+    said = fill(study.sentence, int(_LETTERS * figure.get_figwidth()))
+    figure.suptitle(f"{title}{heading(study.control)} = {study.load:.6g}\n{said}".rstrip(), fontsize=10, wrap=True, parse_math=False)
     return save_figure(figure, path)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import femmembrane as fm
-from femmembrane.accuracy import adapt
+from femmembrane.accuracy import adapt, along, yardstick
 from femmembrane.cli import main
 from tests.cases import OGDEN, POINTS, SCENES, SPECIAL_POINTS, disc_scene
 
@@ -115,6 +115,63 @@ def test_trace_finds_the_limit_points():
     assert [p.pressure for p in found] == pytest.approx([p["pressure"] for p in expected], rel=1e-6)
 
 
+def test_all_equilibria_at_a_load():
+    """On one mesh where it is small; P at the volumes found, against 64 elements of degree 6."""
+    found = fm.equilibria(asking(ABOVE, 1e-7), pressure=1.8)
+    assert len(found) == 4
+    assert {eq.scene.mesh.accuracy for eq in found} == {1e-7}
+    assert len({eq.scene.mesh for eq in found}) == 1
+    assert unknowns(found[0].scene) < 60
+    for eq in found:
+        assert eq.pressure == pytest.approx(1.8, rel=1e-12)
+        fine = fm.equilibrium(ABOVE.replace(degree=6), volume=eq.volume, start=on(ABOVE.replace(degree=6), eq), solver="newton")
+        assert fine.pressure == pytest.approx(1.8, rel=1e-7)
+
+
+def on(scene: fm.Scene, eq: fm.Equilibrium) -> fm.Equilibrium:
+    from femmembrane.results.other_mesh import found_on, state_of
+
+    return found_on(scene, eq.potential, state_of(eq))
+
+
+def test_all_equilibria_on_meshes_of_their_own(monkeypatch):
+    """Where one mesh for all would be large, each has its own."""
+    monkeypatch.setattr(along, "_MOST_OF_ONE", 3)
+    found = fm.equilibria(asking(ABOVE, 1e-7), pressure=1.8)
+    assert len({eq.scene.mesh for eq in found}) > 1
+    assert max(eq.error_estimate().pressure.relative for eq in found) < 1e-7
+
+
+def test_a_fold_over_a_number():
+    """The limit point over the susceptibility, from a point of whatever mesh; against 64 elements of degree 6."""
+    scene = disc_scene(OGDEN, (1.0, 6.5))
+    asked = {"parameter": "membrane.susceptibility", "bounds": (1.0, 3.0)}
+    curves = []
+    for mesh, degree in ((fm.disc(accuracy=1e-7), None), (fm.disc(64), 6)):
+        traced = scene.replace(mesh=fm.disc(8)) if degree is None else scene.replace(mesh=mesh, degree=degree)
+        point = fm.trace(traced, start=1.0, until={"volume": 5.0}).special_points[0]
+        curves.append(fm.fold_curve(scene.replace(mesh=mesh, degree=degree), start=point, **asked))
+    one, best = curves
+    assert one.status is fm.Status.CONVERGED
+    assert one.equilibria[0].scene.mesh.accuracy == 1e-7
+    assert unknowns(one.equilibria[0].scene) < 40
+    assert one.values[-1] == best.values[-1] == 3.0
+    for k in (0, -1):
+        assert one.pressure[k] == pytest.approx(best.pressure[k], rel=1e-7)
+    assert one.timings["mesh"] > 0
+
+
+def test_runs_over_numbers():
+    """Loads and traces over a number have the mesh of all their states."""
+    scene = asking(ABOVE, 1e-7)
+    values = fm.vary(scene, "source.0.strength", [100.0, 200.0], hold={"pressure": 1.0})
+    traced = fm.trace(scene, over="source.0.strength", hold={"volume": 5.0}, until={"source.0.strength": 300.0})
+    for branch in (values, traced):
+        assert branch.status is fm.Status.CONVERGED
+        assert len({eq.scene.mesh for eq in branch}) == 1
+        assert max(eq.error_estimate().pressure.relative for eq in branch) < 1e-7
+
+
 def test_one_equilibrium():
     table = points("dipole_below")[2].expected
     eq = fm.equilibrium(asking(SCENES["dipole_below"], 1e-7), volume=table["volume"])
@@ -170,11 +227,11 @@ def true_errors(branch: fm.Branch) -> list[float]:
     from femmembrane.solve.finer_space import met_across, solved_in
     from femmembrane.solve.state import State
 
-    radii = branch.scene.mesh.breakpoints()
-    fine = potential_of(branch.scene.replace(mesh=fm.disc(radii=radii).refined().refined(), degree=8))
     errors = []
     for k in {*np.linspace(0, len(branch) - 1, 12).astype(int).tolist(), len(branch) - 2}:
         eq = branch[k]
+        radii = eq.scene.mesh.breakpoints()
+        fine = potential_of(eq.scene.replace(mesh=fm.disc(radii=radii).refined().refined(), degree=8))
         state = State(eq.state, eq.pressure, eq.potential.evaluate(eq.state, eq.pressure), 0, 0.0, 0.0, 0.0)
         held = (VolumeControl(eq.volume), CenterHeightControl(eq.center_height))
         found = [solved_in(fine, control, eq.potential, eq.state, eq.pressure, damped=True) for control in held]
@@ -188,12 +245,17 @@ def into_a_dipole(height: float, strength: float, susceptibility: float, materia
     return fm.trace(scene.replace(loads=loads), start=0.3, until={"volume": 20.0}, throw=False)
 
 
-def test_a_trace_ends_where_its_accuracy_does():
-    """Into a dipole at 4.03, where no mesh is fine enough; before the run was checked, errors of P reached 2.4e-3 with 6 elements."""
+def test_a_trace_ends_where_its_accuracy_does(monkeypatch):
+    """Towards a dipole at 4.03 a spike becomes harder without end; before runs were checked, errors of P reached 2.4e-3."""
+    monkeypatch.setattr(along, "_MOST_OF_ONE", 6)
+    monkeypatch.setattr(along, "_MOST_ALONG", 20)
     branch = into_a_dipole(4.0332, 144.694, 0.39864, OGDEN)
     assert branch.status is fm.Status.ACCURACY_NOT_MET
     last = branch[-1]
-    assert f"it is kept up to V = {last.volume:.6g}, P = {last.pressure:.6g}; at the next equilibrium the error is about" in branch.message
+    assert (
+        f"it is kept up to V = {last.volume:.6g}, P = {last.pressure:.6g}; at the next equilibrium mesh.accuracy = 1e-06 is not met by 20"
+        in str(branch.message)
+    )
     assert branch[-1].center_height > 2.5
     assert len(branch) > 60
     assert max(true_errors(branch)) < 1e-6
@@ -220,9 +282,10 @@ def test_traces_are_as_accurate_as_asked(height, strength, susceptibility, mater
 
 def test_a_run_by_loads_ends_where_its_accuracy_does(monkeypatch):
     """No mesh is chosen twice here, and what it promises is a hundredth of what it holds: the loads before the first miss are kept."""
-    monkeypatch.setattr(adapt, "_ROUNDS", 1)
-    shortfall = adapt._shortfall
-    monkeypatch.setattr(adapt, "_shortfall", lambda branch, controls, accuracy: shortfall(branch, controls, accuracy / 100))
+    monkeypatch.setattr(along, "_ROUNDS", 1)
+    monkeypatch.setattr(along, "_FEW_STATES", 6)
+    shortfall = along._shortfall
+    monkeypatch.setattr(along, "_shortfall", lambda branch, controls, accuracy: shortfall(branch, controls, accuracy / 100))
     asked = asking(disc_scene(OGDEN), 1e-5).replace(run=fm.Run(values=(0.5, 1.0, 2.0, 5.0, 20.0, 60.0)))
     branch = fm.run(asked)
     assert branch.status is fm.Status.ACCURACY_NOT_MET
@@ -238,7 +301,7 @@ def test_a_run_by_loads_ends_where_its_accuracy_does(monkeypatch):
 
 def test_accuracy_out_of_reach(monkeypatch):
     """Wrinkles again: the accuracy is named, and what was reached."""
-    monkeypatch.setattr(adapt, "_MOST", 30)
+    monkeypatch.setattr(adapt, "MOST", 30)
     run = fm.Run(control="height", values=(0.1, -0.1))
     scene = asking(disc_scene(OGDEN, (400, -3.25)), 1e-9).replace(tension_field=True, run=run)
     branch = fm.run(scene)
@@ -274,12 +337,7 @@ def test_states_that_depend_on_the_mesh():
     assert e.value.status is fm.Status.ACCURACY_NOT_MET
 
 
-def fold_curve(scene):
-    point = fm.trace(disc_scene(OGDEN, (1.0, 6.5), elements=8), start=1.0, until={"volume": 5.0}).special_points[0]
-    return fm.fold_curve(scene, start=point, parameter="membrane.susceptibility", bounds=(1.0, 3.0))
-
-
-@pytest.mark.parametrize("verb", [lambda s: fm.equilibria(s, pressure=1.0), lambda s: next(fm.trace_iter(s)), fold_curve])
+@pytest.mark.parametrize("verb", [lambda s: next(fm.trace_iter(s))])
 def test_where_no_mesh_is_chosen(verb):
     with pytest.raises(fm.InputError, match=r"mesh\.accuracy = 1e-06: no mesh is chosen for it here"):
         verb(asking(disc_scene(OGDEN, (1.0, 6.5)), 1e-6))
@@ -327,14 +385,14 @@ def test_open_scene():
 
 
 def test_spread():
-    assert adapt.spread([]) == []
-    assert adapt.spread([1.0]) == [0]
-    assert adapt.spread(np.arange(5.0)) == [0, 1, 2, 3, 4]
+    assert yardstick.spread([]) == []
+    assert yardstick.spread([1.0]) == [0]
+    assert yardstick.spread(np.arange(5.0)) == [0, 1, 2, 3, 4]
     zigzag = np.zeros(100)
     zigzag[[37, 61]] = -1, 1
-    chosen = adapt.spread(zigzag)
+    chosen = yardstick.spread(zigzag)
     assert {0, 37, 61, 99} <= set(chosen)
-    assert len(chosen) == adapt.STATES + 2
+    assert len(chosen) == yardstick.STATES + 2
 
 
 def test_graded():
@@ -429,7 +487,7 @@ def test_command_that_ends_early(tmp_path, capfd):
 
 
 def test_command_whose_accuracy_is_not_met(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(adapt, "_MOST", 3)
+    monkeypatch.setattr(adapt, "MOST", 3)
     path, out = tmp_path / "scene.toml", tmp_path / "out"
     path.write_text(SCENE.format(run="values = [60.0]"), encoding="utf-8")
     assert main(["run", str(path), "--out", str(out)]) == 3

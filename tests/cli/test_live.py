@@ -39,6 +39,18 @@ def values(data: dict[str, Any], name: str) -> np.ndarray:
 # --- without a server
 
 
+def test_sliders_of_bodies_go_as_far_as_the_membrane_at_rest_lets_them() -> None:
+    bodies = [fm.Ball(0.8, 0.45), fm.Plane(1.5)]
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(4), obstacles=bodies, run=fm.Run(control="volume", values=(0.3,)))
+    sliders = {slider.name: slider for slider in LiveScene(scene).sliders()}
+    assert {"obstacle.0.height", "obstacle.0.radius", "obstacle.1.height"} <= set(sliders)
+    assert 0.45 < sliders["obstacle.0.height"].low < 0.8  # the ball may not come to the disc
+    assert 0.45 < sliders["obstacle.0.radius"].high < 0.8  # nor to the plate, 1.25 - 0.8
+    for name in ("obstacle.0.height", "obstacle.0.radius", "obstacle.1.height"):
+        for value in (sliders[name].low, sliders[name].high):
+            LiveScene(scene).scene_at({name: value})
+
+
 def test_a_slider_for_every_number() -> None:
     sliders = {slider.name: slider for slider in LiveScene(SCENE).sliders()}
     assert {"source.0.strength", "source.0.height", "membrane.susceptibility", "material.mu.1", "material.alpha.2"} <= set(sliders)

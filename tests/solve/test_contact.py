@@ -295,6 +295,18 @@ def test_obstacle_at_the_height_of_the_limit_point():
     assert branch.status is fm.Status.CONVERGED
 
 
+def test_a_limit_point_and_a_touch_within_one_step():
+    """The plate just above the pole at the limit point: the pressure falls from there to the touch, where it turns in a corner."""
+    bare = fm.trace(fm.Scene(material=NH, mesh=fm.disc(16)), start=1.0, until={"volume": 4.0})
+    fold = next(p for p in bare.special_points if p.kind == "limit_point")
+    branch = fm.trace(plate(fold.center_height + 2e-3, elements=16), start=2.0, until={"volume": 4.0})
+    assert [p.kind for p in branch.special_points] == ["limit_point", "limit_point", "touch"]
+    first, second, touch = branch.special_points
+    assert first.pressure == pytest.approx(fold.pressure, rel=1e-12)
+    assert second.volume == pytest.approx(touch.volume, rel=1e-9)
+    assert fold.volume < second.volume < fold.volume + 0.02
+
+
 def test_a_plate_next_to_a_membrane_at_rest():
     """At 1e-12 the law of a nearly flat disc holds until it touches: P = 3.3367 V^3, and w(0) is in proportion to V."""
     near = plate(1e-12, elements=16)
@@ -448,3 +460,55 @@ def test_a_drawn_force_is_a_curve_on_each_side_of_the_touch():
     middle = (branch[-2].pressure + branch[-1].pressure) / 2
     exact = fm.equilibrium(scene, pressure=middle).contact.force
     assert np.interp(middle, pressure, force) == pytest.approx(exact, rel=2e-3)
+
+
+def before_a_magnet(height, elements=10):
+    magnet = fm.Magnet(height, 0.5, 0.5, strength=(3.0 * 0.5**2 * 0.5 / 4) ** 2, body=True)
+    return fm.Scene(material=NH, mesh=fm.disc(elements), prestretch=1.35, susceptibility=1.0, sources=[magnet])
+
+
+def test_a_cold_start_beyond_pull_in_lands_on_the_body():
+    """Without a body no equilibrium is near; the energy of the state in contact is the least."""
+    found = fm.equilibrium(before_a_magnet(0.58), pressure=0.0)
+    face = 0.58 - found.scene.sources[0].obstacle.length / 2
+    assert found.contact.touching
+    assert found.center_height == pytest.approx(face, abs=1e-12)
+    assert found.verdict("pressure").stable
+
+
+@pytest.mark.slow
+def test_a_membrane_snaps_onto_a_magnet_and_lets_go_farther_away():
+    heights = [0.7, 0.62, 0.58, 0.62, 0.75]
+    loop = fm.vary(before_a_magnet(heights[0], elements=24), "source.0.height", heights, hold={"pressure": 0.0}, at_limit="jump")
+    assert [eq.contact.touching for eq in loop] == [False, False, True, True, False]
+    assert [jump.index for jump in loop.jumps] == [2, 4]
+    assert loop[3].center_height > 2 * loop[1].center_height  # two states at one distance
+
+
+def test_a_mesh_too_coarse_for_an_edge_is_said_to_be_so():
+    scene = fm.Scene(material=NH, mesh=fm.disc(16), prestretch=1.1, obstacles=[fm.Cylinder(0.5, 0.3, 0.6, 0.01)])
+    branch = fm.trace(scene, start=0.45, until={"pressure": 3.0}, max_steps=60)
+    assert branch.status is fm.Status.NOT_RESOLVED
+    assert "obstacle.rounding = 0.01" in branch.message
+    needed = int(branch.message.partition("needed there: ")[2].partition(" ")[0])
+    assert 16 * 4 * (1 / 16) / 0.01 < needed < 16 * 4 * (4 / 16) / 0.01  # elements of 1/16, stretched up to four times
+    fine = fm.Scene(material=NH, mesh=fm.disc(16), prestretch=1.1, obstacles=[fm.Cylinder(0.5, 0.3, 0.6, 0.3)])
+    assert fm.trace(fine, start=0.45, until={"pressure": 1.0}).status is fm.Status.CONVERGED
+
+
+def test_contact_across_the_seam_of_a_closed_meridian_is_one_zone():
+    """A torus between two plates: the zone at its top, where the meridian begins and ends, is the mirror image of that at its bottom."""
+    scene = fm.Scene(
+        material=fm.Gent(30.0), mesh=fm.torus(aspect=20, elements=32), obstacles=[fm.Plane(1.02), fm.Plane(-1.02, side="above")]
+    )
+    volume = 2.0 * potential_of(scene).space.reference_volume
+    contact = fm.equilibrium(scene, volume=volume).contact
+    low, top = sorted(contact.zones, key=lambda zone: zone.force)
+    assert top.start < 2 * np.pi < top.stop
+    assert top.followed
+    assert low.followed
+    assert (2 * np.pi - top.start, top.stop - 2 * np.pi) == pytest.approx((low.stop - np.pi, np.pi - low.start)[::1], abs=1e-7)
+    assert (top.force, top.area) == pytest.approx((-low.force, low.area), rel=1e-8)
+    s = np.linspace(top.start, top.stop, 21)[1:-1]
+    assert contact.pressure(s % (2 * np.pi)) == pytest.approx(contact.pressure(3 * np.pi - s), rel=1e-5)
+    assert np.abs(contact.gap(s % (2 * np.pi))).max() == 0

@@ -386,3 +386,57 @@ def test_another_meridian_is_measured_in_silence():
     kinked = fm.Scene(fm.NeoHookean(), fm.meridian_from_points([(0.3, 0.0), (0.6, 0.1), (1.0, 0.0)], divisions=4))
     study = fm.cost(kinked, volume=0.9, **few | {"elements": (4, 8)})
     assert {line.method for line in study.lines if line.what == "solve"} == {"newton"}
+
+
+# --- the sentence
+
+
+def solve(degree, elements, error, milliseconds, **more):
+    return Measurement("solve", "newton", "warm", degree, elements, error=error, milliseconds=milliseconds, **more)
+
+
+def effect(name, off, on):
+    return [Measurement("effect", name, start, 2, 8, milliseconds=ms) for start, ms in (("off", off), ("on", on))]
+
+
+@pytest.fixture
+def sentence(whole):
+    from dataclasses import replace
+
+    from femmembrane.results.cost import Reference
+
+    def say(*lines, scene=SCENE, floor=1e-13):
+        return replace(whole, scene=scene, lines=tuple(lines), reference=Reference(1.0, floor, 64, 8)).sentence
+
+    return say
+
+
+def test_the_sentence_names_the_cheapest_mesh_and_what_digits_cost(sentence):
+    solves = [solve(2, 64, 5e-7, 0.5), solve(4, 8, 9e-7, 0.2), solve(4, 16, 4e-9, 0.3), solve(8, 16, 1e-12, 0.5), solve(8, 99, 1e-12, 0.9)]
+    assert sentence(*solves) == (
+        "P to 1e-06 costs 0.2 ms a state with 8 elements of degree 4; each further digit costs 0.05 ms, down to 1e-12 with 16 elements of "
+        "degree 8."
+    )
+    asked = SCENE.replace(mesh=fm.disc(ratio=1.0, radii=None, elements=None, accuracy=1e-8), degree=None)
+    assert sentence(*solves, scene=asked).startswith("P to 1e-08 costs 0.3 ms a state with 16 elements of degree 4; each further digit")
+
+
+def test_the_sentence_says_what_effects_add(sentence):
+    lines = [solve(4, 8, 9e-7, 0.2), *effect("azimuthal modes", 0.25, 1.25), *effect("zones of wrinkles", 0.25, 0.251)]
+    assert sentence(*lines).endswith(
+        "On 8 elements of degree 2, where a state costs 0.25 ms, the verdict against n = 1 adds 1 ms and looking for zones of wrinkles "
+        "adds next to nothing."
+    )
+
+
+def test_the_sentence_where_no_mesh_will_do(sentence):
+    assert sentence(solve(1, 8, 1e-3, 0.1)) == "P to 1e-06 takes more elements than were measured; the best error is 1e-03."
+    assert sentence() == ""
+
+
+def test_a_scene_that_asks_for_an_accuracy():
+    """Its mesh is chosen first; the sentence speaks of that accuracy."""
+    found = study(SCENE.replace(mesh=fm.disc(accuracy=1e-4), degree=None), volume=VOLUME, degrees=(2, 4))
+    assert found.scene.mesh.accuracy == 1e-4
+    assert found.sentence.startswith("P to 1e-04 ")
+    assert found.sentence in str(found)

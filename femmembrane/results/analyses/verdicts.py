@@ -13,6 +13,7 @@ import numpy as np
 from ...quantities import axis_label, heading, typed
 from ...scene import ALL, VERDICTS, Perturbations
 from .. import door
+from ..ragged import row_of, stacked
 from ..verdict import Verdict
 from .base import Array, Cell, Curves, EquilibriumAnalysis, PrintedColumn, Remark, Section, Table, Variable
 
@@ -90,8 +91,9 @@ class Verdicts(EquilibriumAnalysis):
 
     def variables(self, branch: Branch) -> Mapping[str, Variable]:
         found: dict[str, Variable] = {}
+        nodes = max(e.potential.space.node_parameters().size for e in branch) if branch.mesh_changes else None
         for p in branch.scene.analysis.verdicts:
-            found |= _variables(p.tag, [_verdict(equilibrium, p) for equilibrium in branch], branch.scene.bending)
+            found |= _variables(p.tag, [_verdict(equilibrium, p) for equilibrium in branch], branch.scene.bending, nodes)
         return found
 
     def restore(self, dataset: xarray.Dataset, branch: Branch) -> None:
@@ -147,9 +149,9 @@ def _verdict(equilibrium: Equilibrium, against: Perturbations) -> Verdict:
     return equilibrium.verdict(against.control, azimuthal=against.azimuthal)
 
 
-def _variables(tag: str, verdicts: Sequence[Verdict], bending: bool) -> dict[str, Variable]:
+def _variables(tag: str, verdicts: Sequence[Verdict], bending: bool, nodes: int | None) -> dict[str, Variable]:
     """All of the verdicts of one class that the columns leave out, and :func:`_stored` needs to build them again. The modes of the worst
-    numbers of waves, which differ, are left out.
+    numbers of waves, which differ, are left out. ``nodes`` is how many a mesh has at most, where it changes along the branch.
     """
     numbers: dict[str, Sequence[Any]] = {
         f"verdict_{tag}": [v.word for v in verdicts],
@@ -163,7 +165,8 @@ def _variables(tag: str, verdicts: Sequence[Verdict], bending: bool) -> dict[str
     shapes = [] if tag == ALL else [_shape(v) for v in verdicts]
     for key, known in next((s for s in shapes if s), {}).items():
         dimension = f"coefficient_{tag}" if key == "coefficients" else "node"
-        variables[f"mode_{tag}_{key}"] = (("step", dimension), np.array([s.get(key, np.full_like(known, np.nan)) for s in shapes]))
+        width = nodes if dimension == "node" else None
+        variables[f"mode_{tag}_{key}"] = (("step", dimension), stacked((s.get(key, known[:0]) for s in shapes), width))
     return variables
 
 
@@ -178,10 +181,11 @@ def _shape(verdict: Verdict) -> dict[str, Array]:
 def _stored(dataset: xarray.Dataset, against: Perturbations) -> Iterator[Verdict]:
     prefix, tag = f"mode_{against.tag}_", against.tag
     parts = {str(name).removeprefix(prefix): v.values for name, v in dataset.items() if str(name).startswith(prefix)}
+    radii = dataset["r"].values
     for k in range(dataset.sizes["step"]):
-        mode = {"r": dataset["r"].values, **{key: values[k] for key, values in parts.items()}}
+        mode = {"r": radii if radii.ndim == 1 else row_of(radii[k]), **{key: np.array(row_of(values[k])) for key, values in parts.items()}}
         coefficients = mode.pop("coefficients", None)
-        known = coefficients is not None and not np.isnan(coefficients).any()
+        known = coefficients is not None and coefficients.size > 0 and not np.isnan(coefficients).any()
         count = int(dataset[f"negative_directions_{tag}"].values[k])
         yield Verdict(
             stable=_STABLE[str(dataset[f"verdict_{tag}"].values[k])],

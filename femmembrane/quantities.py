@@ -483,6 +483,11 @@ def caption(volume: float, pressure: float, between: str = "  ", units: Units | 
     return between.join(f"{symbol} = {text}" for symbol, text in _in_units({"volume": volume, "pressure": pressure}, units or SCALED))
 
 
+def equated(name: str, value: float, units: Units) -> str:
+    """A value of a quantity in a line, to four digits: "P = 1.879", or "p = 15.03 kPa"."""
+    return " = ".join(next(_in_units({name: value}, units)))
+
+
 def _in_units(values: Mapping[str, float], units: Units) -> Iterator[tuple[str, str]]:
     """Symbol, and value with its unit, of each quantity."""
     for name, value in values.items():

@@ -30,6 +30,7 @@ from .progress import observer
 from .report import write as write_report
 
 if TYPE_CHECKING:
+    from ..quantities import Units
     from ..results.branch import Branch
     from ..results.checkpoint import Checkpoints
     from ..results.equilibrium import Equilibrium
@@ -118,7 +119,26 @@ def run(
     if code != DONE:
         further = "; --resume goes on" if checkpoints.path.exists() else ""
         return fail(code, f"{message.rstrip('.')}. Computed before and kept: {count(len(branch))}, in {out}{further}")
-    return succeed(count(len(branch)), written)
+    return succeed(", ".join([count(len(branch)), *_special_points(branch, Units.of(system, asked.converter))]), written)
+
+
+def _special_points(branch: Branch, units: Units) -> list[str]:
+    """How many special points were found, and the pressure at the first limit point, or the first extreme value of the number."""
+    from ..quantities import equated
+    from ..scene.number_units import shown_number
+
+    points = branch.special_points
+    if not points:
+        return []
+    found, kind = count(len(points), "special point", "special points"), "number_fold" if branch.over else "limit_point"
+    first = next((point for point in points if point.kind == kind), None)
+    if first is None:
+        return [found]
+    if not branch.over:
+        return [f"{found} (first limit point at {equated('pressure', first.pressure, units)})"]
+    shown = shown_number(branch.scene, branch.over, units)
+    value = f"{float(shown.into(first.equilibrium.number(branch.over))):.4g}"
+    return [f"{found} ({branch.over} turns at {f'{value} {shown.unit}'.rstrip()})"]
 
 
 def _ended(scene: Scene, out: Path) -> int | None:

@@ -43,12 +43,15 @@ class ShownNumber:
         Text at an axis, with the unit.
     heading : str
         Its name with the unit.
+    unit : str
+        Empty for one without.
     into : callable
         From the numbers of the scene, as an array, to those that are shown.
     """
 
     label: str
     heading: str
+    unit: str
     into: Callable[[Any], NDArray[np.float64]]
 
 
@@ -75,7 +78,7 @@ def shown_kind(key: str, kind: str, units: Units) -> ShownNumber:
 
 
 def _in(unit: str, key: str, into: Callable[[Any], NDArray[np.float64]]) -> ShownNumber:
-    return ShownNumber(key_label(key, unit), f"{key} in {unit}" if unit else key, into)
+    return ShownNumber(key_label(key, unit), f"{key} in {unit}" if unit else key, unit, into)
 
 
 def _as_it_is(values: Any) -> NDArray[np.float64]:

@@ -106,3 +106,28 @@ def test_errors_of_a_sweep_show_its_values_as_given(path, tmp_path, capfd, extra
     ]
     assert main(["sweep", str(path), *words, "--out", str(tmp_path / "out"), *extra]) == 2
     assert "mesh.inner_radius = '50 mm': a number between 0 and 1" in capfd.readouterr().err
+
+
+def test_the_line_of_a_trace_names_its_first_limit_point_in_its_unit(path, tmp_path, capsys):
+    """The limit point of the neo-Hookean disc, P = 1.879 at V = 2.80 (also in test_success), times 6 kPa."""
+    text = FILE.partition("[run]")[0] + '[run]\ncontrol = "arc-length"\nstart = "8 ml"\nuntil = {volume = "32 ml"}\n'
+    path.write_text(text, encoding="utf-8")
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    said = re.search(r" equilibria, 1 special point \(first limit point at p = ([\d.]+) kPa\), written: ", capsys.readouterr().out)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(6 * 1.879, abs=0.01)
+
+
+def test_the_line_of_a_trace_over_a_number_names_where_that_turns(path, tmp_path, capsys):
+    """The height of the pole ends the trace behind the limit point in the height of the magnet."""
+    text = FILE.partition("[mesh]")[0].replace("20 mm", "25 mm").replace("3e-4", "5e-4")
+    text += '[[source]]\nkind = "magnet"\nremanence = "1.2 T"\nradius = "8 mm"\nlength = "20 mm"\nheight = "30 mm"\n'
+    text += '[membrane]\nsusceptibility = 0.5\n[mesh]\nelements = 8\n[run]\ncontrol = "arc-length"\nover = "source.0.height"\n'
+    text += 'hold = {pressure = "5 kPa"}\nuntil = {center_height = "13.45 mm"}\ndirection = -1\n'
+    path.write_text(text, encoding="utf-8")
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    said = re.search(r" equilibria, 1 special point \(source\.0\.height turns at ([\d.]+) mm\), written: ", capsys.readouterr().out)
+    (point,) = rows(tmp_path / "out" / "special_points.csv")
+    assert said is not None
+    assert float(said[1]) == pytest.approx(25 * float(point["source.0.height"]), rel=1e-3)
+    assert float(point["pressure_pa"]) == pytest.approx(5000.0, rel=1e-12)

@@ -22,7 +22,7 @@ until = {volume = 4.0}
 DATA = "center_height,pressure\n0.3,0.9\n0.5,1.4\n0.7,1.7\n0.9,1.85\n"
 #: of each command: its words after the name, a part of its line, and the head of its table
 COMMANDS = {
-    "run": ("scene.toml --out run", " equilibria, written: run/branch.csv ", ""),
+    "run": ("scene.toml --out run", " equilibria, 1 special point (first limit point at P = 1.88), written: run/branch.csv ", ""),
     "sweep": ("scene.toml --over mesh.degree=1,2 --workers 1 --out sweep", "2 scenes (2 converged), written: ", "scenes over mesh.degree"),
     "convergence": ("scene.toml --degrees 2 --elements 2,4 --out study", "2 meshes, written: ", "reference"),
     "fit": ("scene.toml data.csv --parameters material.mu --out fit", "material.mu = ", "95 % interval"),

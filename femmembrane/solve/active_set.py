@@ -356,7 +356,7 @@ def _moved(
         if result.status is not Status.CONVERGED:
             return None
         x, pressure = result.evaluation.carried(result.x), result.pressure
-        return result, _across(result, borders, inside)
+        return result, _across(cast("ContactEvaluation", result.evaluation), result.pressure, borders)
 
     places = np.clip(places, low, high)
     found = solved(places)
@@ -404,19 +404,25 @@ def _held_nodes(root: ContactPotential, zones: list[tuple[int, int]], borders: l
     return held
 
 
-def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
+def _across(evaluation: ContactEvaluation, pressure: float, borders: list[Border]) -> Array:
     """Forces along the normal of the elements beyond the borders, over the largest forces that meet at a node."""
-    evaluation = cast("ContactEvaluation", result.evaluation)
     potential, space = cast("ContactPotential", evaluation.potential), evaluation.potential.space
-    scales = evaluation.force_scale(result.pressure)
+    scales = evaluation.force_scale(pressure)
     found = []
     for border in borders:
         node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
         n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
-        along, across = _end_force(evaluation, result.pressure, border)
+        along, across = _end_force(evaluation, pressure, border)
         scale = abs(n_rho) * scales[0] + abs(n_eta) * scales[1]
         found.append((along * n_rho + across * n_eta) / scale)
     return np.array(found)
+
+
+def border_forces(evaluation: ContactEvaluation, pressure: float) -> Array:
+    """What vanishes at each border that an end of elements follows, shape (k,): see :func:`_across`."""
+    potential = cast("ContactPotential", evaluation.potential)
+    place, degree = {int(node): k for k, node in enumerate(potential.nodes)}, potential.space.degree
+    return _across(evaluation, pressure, [Border(end, not evaluation.held[place[end * degree + 1]]) for end, _ in potential.borders])
 
 
 @dataclass(frozen=True, eq=False)
@@ -484,7 +490,8 @@ def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure
     They count the volume below an element, or beside it, so that its variation has a part at its ends. Two neighbours' parts cancel.
     """
     space = potential.space
-    rho, eta = space.end_position(evaluation.x, border.end)
+    node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
+    rho, eta = (float(part[node]) for part in potential.positions(evaluation.x, evaluation.factor))
     turn = 2 * np.pi * space.side * (-1.0 if border.before else 1.0)  # the element beyond the border begins, or ends, there
     load = potential.edge_load(evaluation, eta)
     if space.lids:

@@ -377,6 +377,25 @@ def test_a_verdict_at_the_touch_says_both_bounds():
     assert "between" not in branch[-1].verdict("pressure").reason
 
 
+def test_a_verdict_at_the_touch_of_a_circle_says_both_bounds_for_waves():
+    """A tube at the wall of a pipe: the membrane with nothing in its way, and the one that the wall holds just after the touch."""
+    pipe = fm.Scene(material=NH, mesh=fm.cylinder(length=2.0, elements=12), obstacles=[fm.Mould([(1.3, -2.0), (1.3, 2.0)])])
+    branch = fm.trace(pipe, start=8.5, until={"volume": 9.6})
+    touch = next(p for p in branch.special_points if p.kind == "touch").equilibrium
+    bare = fm.equilibrium(pipe.replace(obstacles=()), volume=touch.volume)
+    after = fm.equilibrium(pipe, volume=touch.volume + 1e-6, start=touch, solver="newton")
+    for n in (1, 2):
+        free, held = (eq.verdict(azimuthal=n).smallest_eigenvalue for eq in (bare, after))
+        verdict = touch.verdict(azimuthal=n)
+        assert verdict.stable
+        assert verdict.smallest_eigenvalue == pytest.approx(free, rel=1e-6)
+        lower, upper = (float(number) for number in verdict.reason.rpartition("between ")[2].split(" and "))
+        assert (lower, upper) == pytest.approx((free, held), rel=1e-5)
+        assert upper > 1.5 * lower
+        assert "between" not in after.verdict(azimuthal=n).reason
+    assert touch.verdict(azimuthal="all").azimuthal == 1
+
+
 def test_contact_is_told_in_si_units_of_a_scene_with_scales():
     """R0 = 20 mm, T = 0.3 mm, mu = 0.4 MPa: a force has the unit mu T R0 = 2.4 N, an area 4 cm^2, a pressure 6 kPa.
 

@@ -119,7 +119,7 @@ def coarse_at_edge(evaluation: Evaluation, *, edges: Literal["touched", "near", 
     where = {"touched": "which the membrane lies on", "near": "next to the membrane", "all": "where the membrane may come to it"}[edges]
     may = "" if edges == "touched" else "may "
     return (
-        f"elements {may or 'are '}{'be ' if may else ''}too long for the edge of the {potential.obstacles[k].label()} ({what}), {where}: "
+        f"elements {may or 'are '}{'be ' if may else ''}too long for the edge of the {bodies[k].label()} ({what}), {where}: "
         f"they are up to {ratio * radius:.3g} long, and nodes jump around an edge on which they are longer than an eighth of its radius; "
         f"{needed} even ones are shorter where the membrane is stretched as here, or fewer that are graded (mesh.ratio, mesh.radii)"
         f"{', or those of this mesh on a larger radius' if own else ''}"

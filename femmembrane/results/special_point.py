@@ -27,7 +27,7 @@ class SpecialPoint:
     kind : str
         limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset; over a number of the scene number_fold,
         where that is stationary; with bodies in the way touch and release; in a tension field zone_opens and zone_closes, where a zone of
-        wrinkles, or of taut membrane between wrinkles, appears or vanishes.
+        wrinkles, or of taut membrane between wrinkles, appears or vanishes. Such a zone is listed where finer elements confirm it.
     volume, pressure, center_height : float
         Of its equilibrium.
     error : float

@@ -73,7 +73,8 @@ Own = Callable[[State], State]
 def zone_events(segment: Segment[Any], own: Own) -> list[ZoneEvent]:
     """The points of a segment where zones of a tension field open or close.
 
-    Where a state is slack, what a mesh shows depends on the mesh, and nothing is looked for.
+    Where a state is slack, what a mesh shows depends on the mesh, and nothing is looked for. An event that a finer space does not
+    have as well, or whose state is not found there, is left out: it may be the mesh's.
 
     Parameters
     ----------

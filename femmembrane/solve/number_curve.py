@@ -185,6 +185,7 @@ class NumberProblem(CurveProblem[NumberPoint]):
         self.potential = self.family = family
         self.cornered = family.unsettled
         self._branch = BranchProblem(family)
+        self.moving = self._branch.moving
         self.scale, self.bounds = scale, bounds
 
     @property

@@ -30,7 +30,7 @@ OVER = "source.0.height"
 MAGNET = fm.Magnet(height=1.0, radius=0.5, length=0.5, strength=(3.0 * 0.5**2 * 0.5 / 4) ** 2, body=True)
 SCENE = fm.Scene(
     material=fm.NeoHookean(),
-    mesh=fm.disc(elements=48),
+    mesh=fm.disc(elements=96),
     prestretch=1.35,
     sources=[MAGNET],
     susceptibility=1.0,
@@ -39,34 +39,35 @@ SCENE = fm.Scene(
 )
 #: heights of the middle of the magnet: down, and up again
 DOWN, UP = np.linspace(1.0, 0.58, 22), np.linspace(0.59, 1.0, 22)
+SNAP = "#9a1150"
 #: from the middle of the magnet to its face, with the coating of the body
 FACE = MAGNET.obstacle.length / 2
 
 
-def turns() -> tuple[fm.Branch, list[fm.SpecialPoint]]:
+def turns(scene: fm.Scene, max_steps: int) -> tuple[fm.Branch, list[fm.SpecialPoint]]:
     """The branch over the distance, and the points at which it turns: where the membrane snaps on, and where it lets go."""
-    branch = fm.trace(
-        SCENE, over=OVER, hold={"pressure": 0.0}, until={OVER: DOWN[-1]}, direction=-1, max_steps=40
-    )  # a little beyond the second turn
+    branch = fm.trace(scene, over=OVER, hold={"pressure": 0.0}, until={OVER: DOWN[-1]}, direction=-1, max_steps=max_steps)
     found = [point for point in branch.special_points or () if point.kind == "number_fold"]
     return branch, found[:2]
 
 
-def loop() -> fm.Branch:
+def loop(scene: fm.Scene) -> fm.Branch:
     """The membrane while the magnet comes and goes."""
-    return fm.vary(SCENE, OVER, [*DOWN, *UP], hold={"pressure": 0.0}, at_limit="jump")
+    return fm.vary(scene, OVER, [*DOWN, *UP], hold={"pressure": 0.0}, at_limit="jump")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/magnet-contact"), help="folder for table, picture and movie")
     parser.add_argument("--no-movie", dest="movie", action="store_false", help="leave the movie out")
+    parser.add_argument("--quick", action="store_true", help="half as many elements, on which the branch is lost at the edge of the magnet")
     options = parser.parse_args(arguments)
+    scene = SCENE.replace(mesh=fm.disc(elements=48)) if options.quick else SCENE
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
 
-    branch, (on, off) = turns()
-    path = loop()
+    branch, (on, off) = turns(scene, 40 if options.quick else 200)
+    path = loop(scene)
     print("distance     pole    force   radius")
     rows = [(eq.number(OVER) - FACE, eq.center_height, eq.contact.force, eq.contact.radius if eq.contact.touching else 0.0) for eq in path]
     for row in rows:
@@ -97,14 +98,13 @@ def _check(branch: fm.Branch, path: fm.Branch, on: fm.SpecialPoint, off: fm.Spec
 
 def _draw(branch: fm.Branch, path: fm.Branch, turns: Sequence[fm.SpecialPoint], out: Path) -> None:
     figure, (line, shape) = plots.new_figure((11.0, 4.6), title=SCENE.title, widths=(1.1, 1.0))
-    plots.draw_branch(line, path, across=OVER, up="center_height", dots=False, special_points=False)
-    places = [k for k, eq in enumerate(branch) if turns[0].center_height <= eq.center_height < turns[1].center_height]
-    between = replace(branch[places[0] : places[-1] + 1], status=fm.Status.CONVERGED)
-    plots.draw_branch(
-        line, between, across=OVER, up="center_height", dots=False, style=replace(plots.UNSTABLE, label="unstable under pressure control")
-    )
-    turned = np.array([(point.number, point.center_height) for point in turns])
-    line.plot(*turned.T, "h", markersize=7, markerfacecolor="white", markeredgecolor="black", label="limit point in the distance", zorder=4)
+    plots.draw_branch(line, branch, across=OVER, up="center_height", dots=False)
+    on, off = turns
+    landed = on.number - FACE, fm.equilibrium(SCENE.replace(sources=[replace(MAGNET, height=off.number)]), pressure=0.0).center_height
+    for point, there in zip(turns, landed, strict=True):  # at the distance at which it happens
+        look = {"arrowstyle": "-|>", "color": SNAP, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 16}
+        line.annotate("", (point.number, there), (point.number, point.center_height), arrowprops=look)
+    line.plot([], [], color=SNAP, label="snap")
     line.margins(0.06)
     plots.draw_legend(line)
     before = path.jumps[0].index

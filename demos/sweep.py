@@ -127,8 +127,9 @@ def main() -> None:
         for name, found in maps(side, counts, elements, **how).items():
             print(found)
             found.save(given.out / f"{side}-{name}.nc")
+            numbered = [f"limit_pressure#{k}" for k in (2, 3) if name == "limits" and (found.to_xarray()["limit_identity"] == k).any()]
             show = {
-                "limits": ["limit_points", "limit_pressure#2", "limit_pressure#3"],
+                "limits": ["limit_points", *numbered],
                 "tipping": ["onset_center_height", "onset_pressure"],
             }
             found.plot(given.out / f"{side}-{name}.png", show=show.get(name))

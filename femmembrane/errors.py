@@ -146,7 +146,7 @@ _READ = re.compile(
     re.ASCII,
 )
 #: digits with marks between thousands
-_GROUPED = re.compile(r"\d{1,3}(?:[^\d]\d{3})+")
+_GROUPED = re.compile(r"[1-9]\d{0,2}(?:[^\d]\d{3})+")
 _QUOTED = "a text in quotes is no number: leave the quotes out, or write its unit behind it"
 #: characters of a text that is looked at
 _LONGEST_NUMBER = 60

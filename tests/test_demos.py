@@ -19,6 +19,7 @@ DEMOS = Path(__file__).parents[1] / "demos"
 QUICK = {
     "timings.py": ["--quick"],
     "plates.py": ["--quick"],
+    "magnet-contact.py": ["--quick", "--no-movie"],
     "sweep.py": ["--quick"],
     "verdict_cost.py": ["--quick"],
     "wrinkle_numbers.py": ["--quick"],

@@ -355,6 +355,10 @@ def _parsed(cell: Any) -> float:
         return math.nan
 
 
+#: how programs write that nothing was measured
+_NOTHING = ("nan", "na", "n/a", "none", "null", "inf", "infinity", "missing")
+
+
 def _number(name: str, row: int, header: str, cell: Any) -> float:
     where = f"{name}, {'line' if name != 'data' else 'row'} {row}, column {header!r}"
     value = _parsed(cell) if isinstance(cell, str) else as_float(cell)
@@ -364,7 +368,8 @@ def _number(name: str, row: int, header: str, cell: Any) -> float:
         raise InputError(where, cell, f"it has a decimal comma, or one between thousands; {as_meant(cell)}")
     if isinstance(cell, str) and has_unit(cell):
         raise InputError(where, cell, f"a number alone is allowed: its unit stands in the header, as in {_example(header)}")
-    if isinstance(cell, str) and row <= 3 and re.fullmatch(r"[\[(]?[^\W\d_][\w/^]{0,9}[\])]?", cell.strip()):
+    unit_like = isinstance(cell, str) and cell.strip().lower() not in _NOTHING
+    if unit_like and row <= 3 and re.fullmatch(r"[\[(]?[^\W\d_][\w/^]{0,9}[\])]?", cell.strip()):
         allowed = f"a number is allowed; if these are units, write each behind the name of its column, as in {_example(header)}"
         raise InputError(where, cell, allowed)
     if cell is None or (isinstance(cell, str) and not cell.strip()):

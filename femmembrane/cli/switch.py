@@ -58,7 +58,12 @@ def switch(
     """
     branch: Branch = finished(folder, own=own_of(own))
     start = _point(branch, point, folder)
-    ends = dict(_end(branch, text) for text in until or [])
+    ends: dict[str, float] = {}
+    for text in until or []:
+        name, value = _end(branch, text)
+        if name in ends:
+            raise InputError("--until", text, f"each quantity is allowed once; {name} was given before")
+        ends[name] = value
     ways: dict[str, Any] = {"until": ends or None, "direction": direction, "max_steps": max_steps}
     if harmonics is not None:
         ways["harmonics"] = harmonics
@@ -79,7 +84,9 @@ def switch(
         except (InputError, OSError) as error:
             return fail(NOT_WRITTEN if refused(error) else BAD_INPUT, not_written(error, out))
     if found.status is not Status.CONVERGED and (ends or found.status is not Status.STEP_LIMIT):
-        message = explain(found.status, found.message).rstrip(".")
+        # Where harmonics are too few, the message has its own advice: that of the status is about meshes.
+        too_few = isinstance(found, TippedBranch) and found.status is Status.NOT_RESOLVED
+        message = (found.message if too_few else explain(found.status, found.message)).rstrip(".")
         return fail(NOT_CONVERGED, f"{message}. Computed before and kept: {count(len(found))}, in {out}")
     return succeed(count(len(found)), written)
 

@@ -216,7 +216,7 @@ def _near(part: str) -> str:
     word, power = re.sub(r"^(\w*?)\^?(-?[1-9])?\.?$", r"\1", part), re.search(r"(?<=[^\W\d])\^?(-?[1-9])\.?$", part)
     behind = f"^{power[1]}" if power else ""
     if word in _OTHERWISE:
-        return _OTHERWISE[word]
+        return _OTHERWISE[word] if not behind else _raised(_OTHERWISE[word], int(behind[1:]))
     if word and _symbol(word) is not None:
         return word + behind
     lowered = word.lower().removesuffix("s")
@@ -225,6 +225,15 @@ def _near(part: str) -> str:
             return prefix + _NAMES[lowered.removeprefix(name)] + behind
     alike = [symbol for symbol in _spellings() if symbol.lower() == word.lower()]
     return " or ".join(symbol + behind for symbol in alike[:3])
+
+
+def _raised(written: str, power: int) -> str:
+    """A power of what an unknown symbol is written as: (12 in)^2 is 144 in^2."""
+    found = re.fullmatch(r"([\d.e-]*) ?([a-zA-Z]+)(?:\^(\d))?", written)
+    if found is None:  # more than one symbol
+        return f"its {power}. power out of {written}"
+    number = f"{Decimal(found[1]) ** power:.6g} " if found[1] else ""
+    return f"{number}{found[2]}^{int(found[3] or 1) * power}"
 
 
 def _spellings() -> list[str]:

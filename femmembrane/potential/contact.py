@@ -396,6 +396,8 @@ class ContactPotential(FollowingPotential):
     def _round_off(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Array:
         """Normal forces at the nodes that are round-off: on a nearly flat membrane those along the axis are much smaller than others."""
         u, w = raw.force_scale(pressure)
+        if not (math.isfinite(u) and math.isfinite(w)):  # outside the domain of the energy no force is known
+            return np.full(gaps.gap.shape, np.inf)
         found: Array = NO_FORCE * (np.abs(gaps.n_rho) * u + np.abs(gaps.n_eta) * w)
         return found
 

@@ -125,7 +125,7 @@ def numbered_in_words(data: Any) -> Iterator[str]:
         unsure = int((identity == NOT_SURE).sum())
         doubts = [f"{unsure} not followed from a neighbour"] if unsure else []
         doubts += [f"{cut} with another number in a neighbouring scene"] if cut else []
-        yield f"{words} followed from scene to scene: {'; '.join([f'{shown}{further}', *doubts])}"
+        yield f"{words} followed from scene to scene: {'; '.join(filter(None, [f'{shown}{further}', *doubts]))}"
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,8 @@ class SpecialPoint:
         --------
         >>> import femmembrane as fm
         >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(6), degree=2)
-        >>> point = fm.trace(scene, start=0.5, until={"center_height": 3.0}).special_points[0]
+        >>> branch = fm.trace(scene, start=0.5, until={"center_height": 3.0})
+        >>> point = next(point for point in branch.special_points if point.kind == "limit_point")
         >>> estimate = point.error_estimate()
         >>> print(f"P = {point.pressure:.6f}, off by {estimate.pressure.error:.0e}")
         P = 1.879247, off by 7e-05
@@ -108,7 +109,7 @@ class SpecialPoint:
         --------
         >>> import femmembrane as fm
         >>> branch = fm.trace(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), until={"center_height": 2.0})
-        >>> limit = branch.special_points[0]
+        >>> limit = next(point for point in branch.special_points if point.kind == "limit_point")
         >>> print(f"P = {limit.pressure:.4f}, dP/dp = {limit.sensitivity('pressure', 'membrane.prestretch'):.4f}")
         P = 1.8792, dP/dp = -1.3409
         """

@@ -206,14 +206,14 @@ class NumberProblem(CurveProblem[NumberPoint]):
         return self.family.even and point.number == 0
 
     def predict(self, path: Predictor, point: NumberPoint, step: float) -> tuple[float, Array, Array]:
-        guess = path.predict(point.sigma + step)
+        guess = path.predict(point.sigma + step, self.moving > 0)
         low, high = self.bounds
         if low < guess[-1] < high:
             return step, guess, point.dual
         bound = low if guess[-1] <= low else high
         if (point.number - bound) * (guess[-1] - bound) < 0:
-            step = brentq(lambda s: path.predict(point.sigma + s)[-1] - bound, 0.0, step, xtol=1e-15)
-            guess = path.predict(point.sigma + step)
+            step = brentq(lambda s: path.predict(point.sigma + s, self.moving > 0)[-1] - bound, 0.0, step, xtol=1e-15)
+            guess = path.predict(point.sigma + step, self.moving > 0)
         guess[-1] = bound
         return step, guess, self.number_row
 
@@ -447,7 +447,7 @@ class ControlledProblem(NumberProblem):
 
     def predict(self, path: Predictor, point: NumberPoint, step: float) -> tuple[float, Array, Array]:
         """As of any curve; a step towards values that no scene has ends on the last value that one has."""
-        aim = float(path.predict(point.sigma + step)[-1])
+        aim = float(path.predict(point.sigma + step, self.moving > 0)[-1])
         if min(self.bounds) < aim < max(self.bounds) and np.isfinite(aim) and not self.family.takes(aim):
             last = self.family.last_value(point.number, aim)
             self.bounds = (last, self.bounds[1]) if aim < last else (self.bounds[0], last)

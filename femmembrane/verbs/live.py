@@ -105,7 +105,7 @@ class LiveScene:
         """
         scene = self.scene
         for name, value in values.items():
-            scene = Parameter(scene, name).scene_at(float(value))
+            scene = _at(Parameter(scene, name), float(value))
         if elements is not None and self.elements is not None:
             scene = scene.replace(mesh=self.scene.mesh.with_elements(int(elements)))  # type: ignore[attr-defined]  # has elements
         return scene
@@ -159,11 +159,16 @@ def _reached(number: Parameter, end: float) -> float:
     for k in range(_HALVED):
         there = value + (end - value) / 2**k
         try:
-            number.scene_at(there)
+            _at(number, there)
         except InputError:
             continue
         return there
     return value
+
+
+def _at(number: Parameter, value: float) -> Scene:
+    """The scene with a value, in which a run can set out from rest: no body is where the membrane is then."""
+    return number.scene_at(value).replace(squeezed=number.scene.squeezed)
 
 
 def _error(branch: Branch) -> float:

@@ -247,7 +247,8 @@ class TippedRun:
         missed = max((eq for eq in self.found if eq.status is Status.NOT_RESOLVED), key=lambda eq: eq.truncation, default=None)
         if missed is not None and status in (Status.CONVERGED, Status.STEP_LIMIT):
             status = Status.NOT_RESOLVED
-            message = f"harmonics = {missed.harmonics} are too few: about {missed.truncation:.1e} R0 of the displacement is left out"
+            few = f"harmonics = {missed.harmonics} are too few"
+            message = f"{few}: about {missed.truncation:.1e} R0 of the displacement is left out; raise harmonics"
         folds = tuple(self.folds) if self.request.special_points else None
         return TippedBranch(self.scene, tuple(self.found), status, message, folds, dict(self.timings))
 

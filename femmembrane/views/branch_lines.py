@@ -375,7 +375,7 @@ def _draw_special_points(axes: Axes, branch: Branch, shown: _Shown) -> None:
     points = [*(branch.special_points or ()), *(jump.limit for jump in branch.jumps if jump.limit)]
     looks = [(str(p.kind), after(p)) for p in points]
     for kind, word in dict.fromkeys(looks):
-        marker, named = MARKERS.get(kind, ("X", kind.replace("_", " ")))
+        marker, named = MARKERS.get(kind, ("*", kind.replace("_", " ")))
         named = f"{named}, {word}" if word else named
         places = shown.at([p for p, look in zip(points, looks, strict=True) if look == (kind, word)])
         face = "black" if word == SUBCRITICAL else "white"

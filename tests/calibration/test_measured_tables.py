@@ -7,6 +7,7 @@ import pytest
 
 import femmembrane as fm
 from femmembrane.calibration.tables import read_table
+from femmembrane.errors import InputError
 
 SCALES = fm.Scales(radius=0.025, thickness=5e-4, shear_modulus=3e5)
 SCENE = fm.Scene(material=fm.Gent(60.0), mesh=fm.disc(8), degree=4, scales=SCALES)
@@ -193,3 +194,12 @@ def test_noise_is_said_by_column():
     plain = fm.fit(SCENE, data, NAMES, noise=0.05, starts=1, intervals="linear")
     assert with_unit.standard_errors == pytest.approx(plain.standard_errors, rel=1e-9)
     assert np.isfinite(list(plain.standard_errors.values())).all()
+
+
+@pytest.mark.parametrize("word", ["nan", "NA", "n/a", "inf"])
+def test_what_was_not_measured_is_no_unit(tmp_path, word):
+    path = tmp_path / "test.csv"
+    path.write_text(f"center_height_mm,pressure_kPa\n0.5,{word}\n")
+    with pytest.raises(InputError, match="leave the row out") as error:
+        read_table(path, SCALES)
+    assert "units" not in str(error.value)

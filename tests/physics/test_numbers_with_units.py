@@ -105,6 +105,11 @@ def test_examples_are_what_they_are_examples_of(unit):
         ("5 millimetres", "write mm"),
         ("5 MM", "write mm"),
         ("5 mm.", "write mm"),
+        ("0,500 mm", "write 0.500 mm:"),
+        ("2 ft^3", "write 1728 in^3"),
+        ("2 mil^2", "write 0.000001 in^2"),
+        ("2 inch^2", "write in^2"),
+        ("2 microns2", "write um^2"),
     ],
 )
 def test_a_number_written_otherwise_is_understood_and_refused(text, meant):

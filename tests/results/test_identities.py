@@ -12,7 +12,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.errors import InputError
 from femmembrane.results.grid import dataset_of
-from femmembrane.results.identities import followed, with_identities
+from femmembrane.results.identities import followed, numbered_in_words, with_identities
 
 
 @dataclass
@@ -129,6 +129,8 @@ def test_what_is_as_near_to_two_is_not_sure():
     points = followed(data, ["source.0.strength"], "limit_")
     assert points.identity[1, 0] == 0
     assert points.count == 0  # what is in one scene alone is followed nowhere
+    unsure = int((points.identity == 0).sum())
+    assert list(numbered_in_words(data)) == [f"limit points followed from scene to scene: {unsure} not followed from a neighbour"]
 
 
 def mooney(ratio):

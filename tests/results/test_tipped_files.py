@@ -102,6 +102,20 @@ def test_the_command_switches_to_it(upright: fm.Branch, tmp_path: Path, capfd: p
     assert main(["report", str(out)]) == 2
     assert "femmembrane view and export" in capfd.readouterr().err
     assert main(["switch", str(out), "--out", str(tmp_path / "x")]) == 2
-    for wrong, key in ((["--point", "9"], "--point"), (["--until", "height=1"], "--until"), (["--until", "volume=0,42"], "0.42")):
+    twice = ["--until", "volume=0.46", "--until", "volume=0.44"]
+    for wrong, key in (
+        (["--point", "9"], "--point"),
+        (["--until", "height=1"], "--until"),
+        (["--until", "volume=0,42"], "0.42"),
+        (twice, "volume was given before"),
+    ):
         assert main([*words, *wrong]) == 2
         assert key in capfd.readouterr().err
+
+
+def test_too_few_harmonics_are_said_without_advice_on_meshes(upright: fm.Branch, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    upright.save(tmp_path / "branch.nc")
+    assert main(["switch", str(tmp_path), "--out", str(tmp_path / "lean"), "--harmonics", "2", "--max-steps", "3"]) == 3
+    said = capfd.readouterr().err
+    assert "raise harmonics. Computed before and kept" in said
+    assert "mesh" not in said

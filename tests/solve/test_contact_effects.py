@@ -256,3 +256,13 @@ def test_files_keep_both_borders(tmp_path):
         np.testing.assert_array_equal(again.column(name), branch.column(name))
     assert again[-1].zones("mechanical").borders == branch[-1].zones("mechanical").borders
     assert again[-1].of_branch.contact.radius == branch[-1].of_branch.contact.radius
+
+
+def test_outside_the_domain_of_the_energy_no_node_is_sure_of_its_force(monkeypatch):
+    """A force scale that is infinite, as one outside the domain is, meets normals that are zero without a product of the two."""
+    potential = potential_of(fm.Scene(material=NH, mesh=fm.disc(4), degree=2, obstacles=[fm.Plane(0.3)]))
+    raw = potential.evaluate(np.zeros(potential.space.n_free), 0.0)
+    for scale in ((np.inf, np.inf), (np.nan, 1.0)):
+        monkeypatch.setattr(type(raw), "force_scale", lambda self, pressure, scale=scale: scale)
+        judged = potential.judged(raw, potential.gaps(raw.x), 0.0)
+        assert not judged.any()

@@ -171,3 +171,12 @@ def test_a_ball_between_plates_is_compressed_at_the_centre_of_contact_alone():
         assert eq.profile([eq.contact.reference_radius])["mechanical_stress_2"][0] > 0.05
     values = [eq.verdict(azimuthal=4).smallest_eigenvalue for eq in branch]
     assert (np.diff(values[1:]) > 0).all()
+
+
+def test_steps_stay_long_where_slopes_and_points_are_of_different_meshes():
+    """On few elements slopes miss the chords by some thousandths: a cubic magnified that until no step was short enough."""
+    rubber = fm.Ogden(mu=(1.4910, 0.0029, -0.0236), alpha=(1.3, 5.0, -2.0))
+    own = plate(0.9, 12, material=rubber, degree=3)
+    branch = fm.trace(own, over=HEIGHT, hold={"volume": 1.0}, until={HEIGHT: 0.45}, max_steps=25)
+    assert branch.status == "converged"
+    assert branch[-1].pressure == pytest.approx(fm.equilibrium(plate(0.45, 12, material=rubber, degree=3), volume=1.0).pressure, rel=1e-9)

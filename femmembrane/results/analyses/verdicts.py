@@ -181,6 +181,8 @@ def _shape(verdict: Verdict) -> dict[str, Array]:
 def _stored(dataset: xarray.Dataset, against: Perturbations) -> Iterator[Verdict]:
     prefix, tag = f"mode_{against.tag}_", against.tag
     parts = {str(name).removeprefix(prefix): v.values for name, v in dataset.items() if str(name).startswith(prefix)}
+    if not dataset.sizes["step"]:
+        return
     radii = dataset["r"].values
     for k in range(dataset.sizes["step"]):
         mode = {"r": radii if radii.ndim == 1 else row_of(radii[k]), **{key: np.array(row_of(values[k])) for key, values in parts.items()}}

@@ -108,11 +108,14 @@ class Units:
         return self._chosen(name)[1]
 
     def _chosen(self, name: str) -> tuple[str, float]:
-        kind = quantity(name).si
+        return self.of_kind(quantity(name).si)
+
+    def of_kind(self, kind: str) -> tuple[str, float]:
+        """The SI unit of a kind of quantity, and by what such a number is multiplied; empty and 1 where it is shown as it is."""
         if self.scales is None or not kind or not self.scales.converts(kind):
             return "", 1.0
         scale = float(self.scales.to_si(kind, 1.0))
-        unit, size = _fitting(kind, scale)
+        unit, size = _fitting(kind, scale) if kind in _READ else (SI_UNITS[kind].replace("^2", "²").replace("^3", "³"), 1.0)
         return unit, scale / size
 
 
@@ -398,6 +401,13 @@ _KEYS = (
     (r"run\.start", "first load"),
     (r"run\.stop", "last load"),
 )
+#: the same of those that are shown in SI units
+_MEASURED = (
+    (r"source(?:\.\d+)?\.strength", "strength of the source"),
+    (r"source(?:\.\d+)?\.height", "height of the source"),
+    (r"obstacle(?:\.\d+)?\.height", "height of the obstacle"),
+    (r"electric\.voltage", "voltage"),
+)
 
 
 def quantity(name: str) -> Quantity:
@@ -452,8 +462,10 @@ def axis_label(name: str, units: Units | None = None) -> str:
     return quantity(name).label or words(name)
 
 
-def key_label(key: str) -> str:
-    """Text at an axis over a number of a scene; its key where nothing better is known."""
+def key_label(key: str, unit: str = "") -> str:
+    """Text at an axis over a number of a scene, which is shown in an SI unit or as it is; its key where nothing better is known."""
+    if unit:
+        return f"{next((text for pattern, text in _MEASURED if re.fullmatch(pattern, key)), key)} in {unit}"
     for pattern, text in _KEYS:
         if match := re.fullmatch(pattern, key):
             return text.format(*(int(k) + 1 for k in match.groups()))  # terms are counted from 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -90,6 +91,8 @@ def fit(
     succeed(found.summary, [out / name for name in names], table=tables, asked=table)
     if found.status is not Status.CONVERGED:
         return fail(NOT_CONVERGED, f"{'; '.join(found.notes)}. What suits the data best so far is in {out}")
+    for note in () if sys.stdout.isatty() else found.notes:  # on a terminal the table ends with them
+        fail(DONE, note)
     return DONE
 
 

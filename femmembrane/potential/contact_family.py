@@ -31,6 +31,8 @@ from .potential import Potential
 if TYPE_CHECKING:
     from types import SimpleNamespace
 
+    from ..scene import Scene
+
 #: change of a number, over its size and over that of the membrane, from which the rates of the numbers of a profile are taken: these are
 #: linear in most numbers
 _STEPS = (2.0**-8, 2.0**-16)
@@ -84,6 +86,9 @@ class ContactFamily(ContactPotential, Family):
     def member(self, number: float) -> Potential:
         """The potential of the scene that has a value of the number, on the mesh of the scene."""
         return potential_of(self._scene_at(number))
+
+    def scene_at(self, number: float) -> Scene:
+        return self._scene_at(number)  # a member is shared by scenes with other scales and analyses, and its own scene has none
 
     def by_itself(self, factor: float) -> tuple[Potential, float]:
         return self.member(factor), 1.0

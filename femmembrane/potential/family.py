@@ -134,6 +134,16 @@ class Family(Potential):
             self._members.pop(next(iter(self._members)), None)
         return known
 
+    def scene_at(self, number: float) -> Scene:
+        """The scene that has a value of the number, with all that was asked of the scene given: scales, analyses, and its title.
+
+        Raises
+        ------
+        InputError
+            For a value that the scene cannot take.
+        """
+        return self.member(number).scene
+
     def takes(self, number: float) -> bool:
         """Whether there is a scene with a value of the number."""
         try:

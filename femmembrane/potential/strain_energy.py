@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -59,6 +60,10 @@ class StrainEnergy:
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise InputError("material.function", self.function, "a function of the stretches (lambda_1, lambda_2) is allowed")
+        if (count := _stretches(self.function)) not in (2, None):
+            counted = f"a function of two stretches (lambda_1, lambda_2) is needed, and it takes {count} argument{'s'[: count != 1]}"
+            hint = "; the third stretch is 1/(lambda_1 lambda_2), for the material is incompressible" if count == 3 else ""
+            raise InputError("material.function", self.function, counted + hint)
         try:
             rest, there, mirrored = at_points(_derivatives(self.function), np.array([0, 0.2, 0.1]), np.array([0, 0.1, 0.2])).T
         except Exception as error:  # whatever a stranger's function raises
@@ -102,6 +107,22 @@ class StrainEnergy:
             return list(ca.vertsplit(function(ca.vertcat(e1, e2))))
         e1, e2 = np.broadcast_arrays(np.asarray(e1, dtype=float), np.asarray(e2, dtype=float))
         return [row.reshape(e1.shape) for row in at_points(function, e1, e2)]
+
+
+def _stretches(function: Callable[..., Any]) -> int | None:
+    """How many arguments a function needs that cannot be called with two; 2 where it can, None where nobody knows."""
+    try:
+        signature = inspect.signature(function)
+    except (ValueError, TypeError):  # of a ufunc, or written in C
+        return None
+    try:
+        signature.bind(None, None)
+    except TypeError:
+        kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        placed = [p for p in signature.parameters.values() if p.kind in kinds]
+        needed = [p for p in placed if p.default is p.empty]
+        return None if len(placed) == 2 else len(needed) if len(needed) > 2 else len(placed)
+    return 2
 
 
 @lru_cache(maxsize=64)

@@ -23,7 +23,7 @@ from ..physics.units import has_unit, in_unit
 from ..quantities import SI_UNITS, SYSTEMS, quantity
 from .moduli import without_moduli
 from .run import PRESCRIBED
-from .toml import item_path
+from .toml import item_path, modulus_of_own
 
 #: kinds of the numbers of a scene file, by table and key; a unit in place of a kind is that of a number which a scene keeps in SI units
 _KINDS: Mapping[str, Mapping[str, str]] = {
@@ -143,7 +143,10 @@ class _Laboratory:
             raise InputError(f"scales.{name}", table[name], unknown_name(f"scales.{name}", name, names).allowed)
         missing = [name for name in ("radius", "thickness", "shear_modulus") if name not in table]
         if missing:
-            more = "; the shear modulus follows where [material] has its moduli in Pa, or a name" if missing[-1] == "shear_modulus" else ""
+            follows = (
+                modulus_of_own(self.tables.get("material")) or "the shear modulus follows where [material] has its moduli in Pa, or a name"
+            )
+            more = f"; {follows}" if missing[-1] == "shear_modulus" else ""
             raise InputError(key, value, f"a number in SI units needs [scales], where {', '.join(missing)} is missing{more}")
         return Scales(**table)
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..physics.units import has_unit
 
 if TYPE_CHECKING:
     from .value import Scene
@@ -210,7 +211,10 @@ def _made(path: str, cls: type, arguments: Mapping[str, Any]) -> Any:
     known = _names(cls)
     for name in arguments:
         if name not in known:
-            raise InputError(f"{path}.{name}", arguments[name], f"unknown; arguments of {cls.__name__}: {', '.join(known) or 'none'}")
+            allowed = f"unknown; arguments of {cls.__name__}: {', '.join(known) or 'none'}"
+            if path == "material" and has_unit(arguments[name]):
+                allowed += "; the shear modulus in Pa is shear_modulus in [scales], and all else of a material is over it"
+            raise InputError(f"{path}.{name}", arguments[name], allowed)
     try:
         return cls(**arguments)
     except TypeError as error:  # an argument is missing

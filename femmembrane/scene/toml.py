@@ -195,7 +195,7 @@ def scene_arguments(data: Mapping[str, Any], folder: Path, own: Parts) -> dict[s
     for name in _ALONG:
         if str(arguments.get(name, "")).startswith(":"):
             arguments[name] = own.factor(f"membrane.{name}", arguments[name])
-    scales = _build("scales", Scales, tables["scales"]) if "scales" in data else None
+    scales = _scales(tables) if "scales" in data else None
     return dict(
         material=material_of(tables["material"], own),
         sources=_build_list("source", SOURCES, data.get("source", ()), own, scales),
@@ -210,6 +210,21 @@ def scene_arguments(data: Mapping[str, Any], folder: Path, own: Parts) -> dict[s
         electric=_electric(tables["electric"]) if "electric" in data else None,
         **arguments,
     )
+
+
+def _scales(tables: Mapping[str, Any]) -> Scales:
+    if "shear_modulus" not in tables["scales"] and (advice := modulus_of_own(tables["material"])):
+        raise InputError("scales.shear_modulus", None, f"missing; {advice}")
+    made: Scales = _build("scales", Scales, tables["scales"])
+    return made
+
+
+def modulus_of_own(material: Any) -> str:
+    """Where the shear modulus of a material of one's own stands, which no argument of its class can be; empty for one of the package."""
+    if not isinstance(material, Mapping) or not is_own(material.get("model")):
+        return ""
+    beside = "" if "mu" not in material else ", in place of mu in [material]"
+    return f"a material of one's own is over its shear modulus: give that here as shear_modulus in Pa{beside}"
 
 
 def tables_of(scene: Scene, record: bool = False) -> dict[str, Any]:

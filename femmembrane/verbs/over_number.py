@@ -137,7 +137,7 @@ class OverNumber:
 
     def scene_of(self, state: State) -> Scene:
         own = state.evaluation.potential
-        return self.family.member(state.evaluation.factor).scene.bordered(own.borders)
+        return self.family.scene_at(state.evaluation.factor).bordered(own.borders)
 
     def potential_at(self, point: BranchPoint) -> Potential:
         return self.family.member(point.state.evaluation.factor)

@@ -26,6 +26,7 @@ from ..solve.state import Predictor
 from ..solve.tipped import TippedPoint, TippedProblem, compressed
 from ..stability.azimuthal import onset_mode
 from .arguments import check_max_steps
+from .targets import in_words, turned_back
 from .trace_run import checked_targets
 
 #: harmonics to begin with, how many are added at a time, and the most
@@ -145,8 +146,9 @@ class TippedRun:
             if refined is None:
                 return self._result(Status.NOT_RESOLVED, self._unresolved())
             point, leaving = refined, False
-        targets = dict(request.targets) or "an end"
-        return self._result(Status.STEP_LIMIT, f"{request.max_steps} steps were made without meeting {targets}")
+        message = f"{request.max_steps} steps were made without meeting {in_words(self.scene, request.targets)}"
+        back = turned_back(self.scene, self.found, self.folds, request.targets)
+        return self._result(Status.STEP_LIMIT, "; ".join(filter(None, [message, back])))
 
     def _next(self, point: TippedPoint, tracer: Tracer, leaving: bool) -> TippedPoint:
         if not leaving:

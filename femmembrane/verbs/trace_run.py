@@ -13,7 +13,7 @@ import numpy as np
 from ..accuracy.along import Along
 from ..accuracy.borders import Solve, holding
 from ..checks import choice, is_number, number, sign, store
-from ..discretization.meridian import in_words
+from ..discretization.meridian import in_words as accuracy_in_words
 from ..discretization.space import transferred
 from ..errors import InputError, SolveError, Status
 from ..potential import Array, Potential, potential_of
@@ -44,6 +44,7 @@ from .meshing import carried
 from .over_number import gas_of
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record, record_on_borders, remembered, restore, resume, special_point
+from .targets import in_words, place_of, turned_back, value_in_words
 
 #: distance from a value at which a trace ends, in units of the membrane, that is none
 _AT_TARGET = 1e-9
@@ -321,20 +322,22 @@ class TraceRun(Run[Branch]):
     def _all_made(self) -> End:
         if self.shortfall is not None:
             return Status.ACCURACY_NOT_MET, str(self.shortfall)
-        message = f"{self.request.max_steps} steps were made without meeting {dict(self.request.targets) or 'an end'}"
-        if away := self._went_away():
+        targets = self.request.targets
+        message = f"{self.request.max_steps} steps were made without meeting {in_words(self.scene, targets)}"
+        if away := self._went_away() or turned_back(self.scene, self.found, self.special or (), targets):
             message = f"{message}; {away}"
         return self._explained(Status.STEP_LIMIT, message)
 
     def _went_away(self) -> str:
         """Advice for a branch that left all values behind at which it was to end; empty where it did not."""
         request, known = self.request, not isinstance(self.request.start, Branch)
-        ways = [(abs(_place(eq, q) - v) for eq in (self.found[0], self.found[1], self.found[-1])) for q, v in request.targets.items()]
+        ways = [(abs(place_of(eq, q) - v) for eq in (self.found[0], self.found[1], self.found[-1])) for q, v in request.targets.items()]
         if not (known and ways and all(first < second < last for first, second, last in ways)):
             return ""
         quantity, value = next(iter(request.targets.items()))
         words = CONTROLS[quantity].words if quantity in CONTROLS else quantity
-        begun = f"it set out from {words} {_place(self.found[0], quantity):.6g}, away from {value:.6g}"
+        first = value_in_words(self.scene, quantity, place_of(self.found[0], quantity))
+        begun = f"it set out from {words} {first}, away from {value_in_words(self.scene, quantity, value)}"
         return f"{begun}: direction = {-request.direction} sets out the other way"
 
     def _explained(self, status: Status, message: str) -> End:
@@ -398,7 +401,7 @@ class TraceRun(Run[Branch]):
     def _not_met(self, why: str) -> End:
         """The end where no mesh keeps the accuracy."""
         state = self.point.state
-        asked = in_words(getattr(self.here.mesh, "accuracy", None) or 0.0)
+        asked = accuracy_in_words(getattr(self.here.mesh, "accuracy", None) or 0.0)
         kept = f"it is kept up to V = {state.volume:.6g}, P = {state.pressure:.6g}; at the next equilibrium {why}"
         return Status.ACCURACY_NOT_MET, f"mesh.accuracy = {asked} is not met all along: {kept}"
 
@@ -593,10 +596,3 @@ class TraceRun(Run[Branch]):
         special = None if self.special is None else tuple(self.special)
         known = tuple(self.found) if found is None else found
         return Branch(self.scene, known, status, message, dict(self.timings), special, memory, solver="newton")
-
-
-def _place(equilibrium: Equilibrium, quantity: str) -> float:
-    """A quantity or a number of the scene in an equilibrium; NaN for an amount of gas, which it knows by its chamber alone."""
-    if "." in quantity:
-        return equilibrium.number(quantity)
-    return float(getattr(equilibrium, quantity)) if quantity in CONTROLS else float("nan")

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Status
-from ..quantities import PLACES, Units, axis_label, key_label
+from ..quantities import PLACES, Units, axis_label
 from ..results.curve import half_way, turning
 from ..results.postbuckling import SUBCRITICAL, UNKNOWN
 from ..results.special_point import SpecialPoint
 from ..scene import ALL
+from ..scene.number_units import shown_number
 from .figures import AMONG, COLORS, ILL_POSED_WORD, RED, UNRESOLVED, UNTESTED, Style, style_of
 from .labels import add_label
 from .zones import BRANCH_WIDTH, PATTERNS, draw_along, new_label, shown_kinds, zone_label
@@ -92,8 +93,8 @@ def draw_branch(
     """
     of_scene = Units.of(units, branch.scene.converter)
     shown = _Shown(branch, (across, up), of_scene)
-    axes.set_xlabel(_label(across, of_scene))
-    axes.set_ylabel(_label(up, of_scene))
+    axes.set_xlabel(_label(branch, across, of_scene))
+    axes.set_ylabel(_label(branch, up, of_scene))
     axes.grid(color="0.9", linewidth=0.6)
     points = shown.at(branch)
     controls = () if style else branch.scene.analysis.stability
@@ -157,13 +158,17 @@ class _Shown:
         for name in quantities:
             if name not in PLACES:
                 self.curve.reader(name)  # refuses what cannot be shown
-        self.factors = np.array([_factor(name, units) for name in quantities])
-        self._lines = {key: line * self.factors for key, line in self.curve.lines(quantities).items()}
+        self._into = [_into(branch, name, units) for name in quantities]
+        self._lines = {key: self._in_units(line) for key, line in self.curve.lines(quantities).items()}
+
+    def _in_units(self, values: Array) -> Array:
+        """Values of the quantities, in columns, in the units of the axes."""
+        return np.stack([into(column) for into, column in zip(self._into, values.T, strict=True)], axis=1)
 
     def at(self, items: Sequence[Equilibrium | SpecialPoint]) -> Array:
         """Places in the picture of the steps of the branch, or of special points."""
         values = [[self._value(k, item, q) for q in self.quantities] for k, item in enumerate(items)]
-        return np.array(values, dtype=float).reshape(-1, len(self.quantities)) * self.factors
+        return self._in_units(np.array(values, dtype=float).reshape(-1, len(self.quantities)))
 
     def _value(self, number: int, item: Equilibrium | SpecialPoint, quantity: str) -> float:
         if quantity in PLACES:
@@ -180,7 +185,7 @@ class _Shown:
 
     def ends(self, snap: Snap) -> Array:
         """Both ends of the arrow of a snap."""
-        return np.array([[self.curve.value(point, q) for q in self.quantities] for point in (snap.tail, snap.tip)]) * self.factors
+        return self._in_units(np.array([[self.curve.value(point, q) for q in self.quantities] for point in (snap.tail, snap.tip)]))
 
     def line(self, pieces: Sequence[Piece]) -> Array:
         """Pieces of the curve as one polygon."""
@@ -206,14 +211,17 @@ def answer(branch: Branch) -> str:
     return "center_height" if "pressure" in branch.hold else "pressure"
 
 
-def _label(name: str, units: Units) -> str:
-    """The text at an axis that shows a quantity, or a number of the scene, which is shown as the scene has it."""
-    return key_label(name) if "." in name else axis_label(name, units)
+def _label(branch: Branch, name: str, units: Units) -> str:
+    """The text at an axis that shows a quantity, or a number of the scene."""
+    return shown_number(branch.scene, name, units).label if "." in name else axis_label(name, units)
 
 
-def _factor(name: str, units: Units) -> float:
-    """What a quantity is multiplied by in these units; a number of the scene stays as it is."""
-    return 1.0 if "." in name else units.factor(name)
+def _into(branch: Branch, name: str, units: Units) -> Callable[[Array], Array]:
+    """What turns a quantity, or a number of the scene, into what the axes show."""
+    if "." in name:
+        return shown_number(branch.scene, name, units).into
+    factor = units.factor(name)
+    return lambda values: values * factor
 
 
 def _changes(branch: Branch, point: SpecialPoint) -> tuple[Any, ...] | None:

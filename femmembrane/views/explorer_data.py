@@ -21,13 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SolveError, Status
-from ..quantities import PLACES, PROFILE, SCALED, Units, axis_label, heading_in, in_si, key_label, quantity
+from ..quantities import PLACES, PROFILE, SCALED, Units, axis_label, heading_in, in_si, quantity
 from ..results.analyses import asked, column_heading, known_quantity
 from ..results.analyses.verdicts import Verdicts
 from ..results.curve import specials_between
 from ..results.table import columns
 from ..results.zones import KINDS
 from ..scene import ALL
+from ..scene.number_units import shown_number
 from .backend import load
 from .branch_lines import MARKERS, Strands, after, answer
 from .figures import AMONG, Style
@@ -103,7 +104,7 @@ def page_data(branch: Branch, units: str = "scaled", *, shapes: bool = True) -> 
         "good": branch.status is Status.CONVERGED,
         "message": branch.message if branch.status is Status.CONVERGED else f"{branch.message} What helps: {branch.status.advice}.",
         "notes": [*([branch.mesh_used] if branch.mesh_used else []), *branch.notes, *_left_out(left_out)],
-        "quantities": [{"name": name, "label": _label(name, chosen)} for name in names],
+        "quantities": [{"name": name, "label": _label(branch, name, chosen)} for name in names],
         "axes": [branch.over or "volume", answer(branch)],
         "heading": AMONG if branch.scene.analysis.stability else "",
         "lines": [{**_look(style), "values": _columns(line)} for style, line in strands.lines],
@@ -130,10 +131,10 @@ def _left_out(count: int) -> list[str]:
     return [f"{count} equilibria between those shown are left out of this page; the line goes through all of them"] if count else []
 
 
-def _label(name: str, units: Units) -> str:
+def _label(branch: Branch, name: str, units: Units) -> str:
     own = known_quantity(name)
     if "." in name:
-        return key_label(name)
+        return shown_number(branch.scene, name, units).label
     label = axis_label(name, units) if own == quantity(name) else own.label or column_heading(name)
     return label if own.unit == "1" else f"{label} in {own.unit}"
 

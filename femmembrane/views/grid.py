@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Status, unknown_name
-from ..quantities import PLACES, Units, axis_label, key_label
+from ..quantities import PLACES, Units, axis_label
 from ..results.grid import DIMENSIONS, place_of_variable
 from ..results.identities import FAMILIES, NOT_SURE, with_identities
+from ..scene.laboratory import number_kind
+from ..scene.number_units import shown_kind
 from .backend import title_text
 from .figures import BLUE, DASHED, DOTTED, ORANGE, SOLID, fitting_columns, new_figure, save_axes, save_figure
 
@@ -80,6 +82,8 @@ def plot_grid(
     panels = [(name, _factor(name, chosen), _values(data, name, dims)) for name in names]
     if not panels:
         raise InputError("sweep", sweep.quantity, "no scene has a result to show; status and message say why")
+    numbers = {key: shown_kind(key, number_kind(key), chosen) for key in dims}
+    data = data.assign_coords({key: shown.into(data[key].values) for key, shown in numbers.items() if data[key].dtype.kind in "if"})
     draw = _draw_map if len(dims) == 2 else _draw_curve
     handles: dict[str, Any] = {}
     hatches: dict[str, str] = {}
@@ -87,6 +91,9 @@ def plot_grid(
         figure, row = new_figure((5.2 * len(panels) + 0.4, 4.9), widths=[1.0] * len(panels))
     for axes, (name, factor, values) in zip(np.atleast_1d(row) if ax is None else [ax], panels, strict=ax is None):
         handles |= draw(axes, data, dims, name, _label(name, chosen), factor * values, hatches, factor)
+        axes.set_xlabel(numbers[dims[0]].label)
+        if len(dims) == 2:
+            axes.set_ylabel(numbers[dims[1]].label)
     if ax is not None:
         if handles:
             ax.legend(list(handles.values()), list(handles), framealpha=0.9, edgecolor="none", fontsize=8.5)
@@ -245,7 +252,7 @@ def _draw_map(
     axes.set_facecolor("white")
     if np.isfinite(grid).any():
         _shade(axes, name, x_edges, y_edges, grid, grid[np.isfinite(grid) & (reasons == "")])
-    axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]), xlabel=key_label(dims[0]), ylabel=key_label(dims[1]))
+    axes.set(xlim=(x_edges[0], x_edges[-1]), ylim=(y_edges[0], y_edges[-1]))
     for key, positions, axis in ((dims[0], x, axes.xaxis), (dims[1], y, axes.yaxis)):
         if not _positions(data, key)[1]:
             axis.set_ticks(positions, [title_text(str(v)) for v in data[key].values], parse_math=False)
@@ -310,7 +317,7 @@ def _draw_curve(
     x, values, reasons = x[order], values[order], _reasons(data, values, name)[order]
     if not handles:
         axes.plot(x, values, "-", color=BLUE, linewidth=1.6, marker=".", markersize=5)
-    axes.set(xlabel=key_label(key), ylabel=label)
+    axes.set(ylabel=label)
     axes.grid(color="0.92", linewidth=0.6)
     if not numbers:
         axes.set_xticks(x, [title_text(str(v)) for v in data[key].values[order]], parse_math=False)

@@ -22,6 +22,7 @@ from ..quantities import PLACES, Units, axis_label, caption, heading_in, words
 from ..results.analyses import asked
 from ..results.analyses.base import Curves, Drawing, Section
 from ..results.curve import slopes_of
+from ..scene.number_units import shown_number
 from . import plots
 from .backend import load
 from .html import branch_rows, page_of, pairs, table, text
@@ -161,21 +162,33 @@ class _Page:
             return ""
         if not points:
             return "<p>Searched for special points: there are none.</p>"
-        names, over = {kind: name for kind, (_, name) in plots.MARKERS.items()}, [self.branch.over] if self.branch.over else []
+        names = {kind: name for kind, (_, name) in plots.MARKERS.items()}
+        over = [(self.branch.over, shown_number(self.branch.scene, self.branch.over, self.units))] if self.branch.over else []
         rows = [
             [
                 names.get(str(p.kind), str(p.kind))
                 + (f", n = {p.azimuthal}" if p.azimuthal else "")
                 + (f", {word}" if (word := plots.after(p)) else "")
                 + (f": {p.zone}" if p.zone else ""),
-                *(p.equilibrium.number(name) for name in over),
+                *(float(shown.into(p.equilibrium.number(name))) for name, shown in over),
                 *(self.units.factor(name) * getattr(p, name) for name in PLACES),
                 float(f"{p.error:.1e}"),
             ]
             for p in points
         ]
         said = "".join(f"<p>{escape(p.postbuckling.words[:1].upper() + p.postbuckling.words[1:])}.</p>" for p in points if p.azimuthal)
-        return table(["special point", *over, *(heading_in(name, self.units) for name in PLACES), "relative error"], rows) + said
+        return (
+            table(
+                [
+                    "special point",
+                    *(shown.heading for _, shown in over),
+                    *(heading_in(name, self.units) for name in PLACES),
+                    "relative error",
+                ],
+                rows,
+            )
+            + said
+        )
 
     def _jumps(self) -> str:
         names, rows = ("volume", "pressure"), []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -86,3 +87,27 @@ def test_a_link_in_the_way_is_no_result(tmp_path, capsys):
     assert command(out) == BAD_INPUT
     assert elsewhere.read_text(encoding="utf-8") == "mine"
     assert "fitted.toml" in capsys.readouterr().err
+
+
+def test_what_is_suspected_of_a_table_is_said(tmp_path, capsys, monkeypatch):
+    """Exchanged columns have a fit; the table on a terminal says what is suspected, and in a pipe a line on stderr does."""
+    columns = {"pole_height_mm": [5.0, 8.75, 12.5, 16.25, 20.0], "pressure_kPa": [0.4014, 1.7147, 3.6509, 5.5543, 7.0278]}
+    (tmp_path / "scene.toml").write_text(
+        '[material]\nmodel = "mooney-rivlin"\nratio = 0.1\n[mesh]\nelements = 4\ndegree = 4\n'
+        '[scales]\nradius = "25 mm"\nthickness = "0.3 mm"\nshear_modulus = "0.33 MPa"\n'
+    )
+    swapped = zip(columns, reversed(columns.values()), strict=True)
+    names, values = zip(*swapped, strict=True)
+    lines = [",".join(names), *(",".join(map(str, row)) for row in zip(*values, strict=True))]
+    (tmp_path / "data.csv").write_text("\n".join(lines) + "\n")
+    words = ["fit", str(tmp_path / "scene.toml"), str(tmp_path / "data.csv"), "--parameters", "scales.shear_modulus"]
+    words += ["--starts", "1", "--intervals", "linear", "--out", str(tmp_path / "out")]
+    assert main(words) == DONE
+    said = capsys.readouterr()
+    assert said.err.count("are these columns swapped?") == 1
+    assert "swapped" not in said.out
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    assert main(words) == DONE
+    said = capsys.readouterr()
+    assert said.out.count("are these columns swapped?") == 1
+    assert "swapped" not in said.err

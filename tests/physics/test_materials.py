@@ -264,6 +264,8 @@ def test_beyond_locking_nothing_is_a_number():
         (lambda: fm.Polynomial(c11=-0.001, c20=0.01), r"material.c11 = -0.001: .*Baker-Ericksen"),
         (lambda: fm.StrainEnergy(3), r"material.function = 3: a function"),
         (lambda: fm.StrainEnergy(lambda a, b: a if a > b else b), r"must accept symbols"),
+        (lambda: fm.StrainEnergy(lambda a, b, c: a), r"a function of two stretches .* takes 3 arguments; the third stretch is 1/"),
+        (lambda: fm.StrainEnergy(lambda a: a), r"a function of two stretches .* takes 1 argument$"),
         (lambda: fm.StrainEnergy(lambda a, b: a + b), r"must be 0 at rest, not 2, 1, 1"),
         (lambda: fm.StrainEnergy(lambda a, b: a**2 + b**2 + 1 / (a * b) ** 2 - 3), r"shear modulus must be 1, not 2;"),
         (lambda: fm.StrainEnergy(lambda a, b: (a**2 + b**2 + 1 / (a * b) ** 2 - 3) / 2 + (a - 1) ** 3), r"symmetric"),

@@ -167,3 +167,20 @@ def test_another_module_of_the_same_name_is_refused(folder: Path, tmp_path_facto
     (other / "ownparts.py").write_text(MODULE)
     with pytest.raises(fm.InputError, match="rename one"):
         fm.Scene.from_toml(written(other, material=material))
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({}, r"scales.shear_modulus = None: missing; a material of one's own .* shear_modulus in Pa, in place of mu in \[material\]"),
+        ({"units": "si"}, r"shear_modulus is missing; a material of one's own .* give that here as shear_modulus in Pa"),
+        ({"modulus": 4e5}, r"material.mu = '0.4 MPa': unknown; arguments of Knowles: b, n; the shear modulus in Pa is shear_modulus in"),
+    ],
+)
+def test_the_shear_modulus_of_a_material_of_ones_own_stands_in_the_scales(folder: Path, more: dict[str, object], words: str) -> None:
+    scales = {"radius": 0.02, "thickness": 3e-4} | ({"shear_modulus": more["modulus"]} if "modulus" in more else {})
+    material = {"model": "ownparts:Knowles", "b": 0.7, "n": 1.0, "mu": "0.4 MPa"}
+    run = {"control": "pressure", "values": ["1 kPa"]} if "units" in more else TABLES["run"]
+    tables = {**TABLES, "material": material, "scales": scales, "run": run} | ({"units": "si"} if "units" in more else {})
+    with pytest.raises(fm.InputError, match=words):
+        fm.Scene.from_dict(tables, folder=folder, own=True)

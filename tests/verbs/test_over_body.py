@@ -180,3 +180,23 @@ def test_steps_stay_long_where_slopes_and_points_are_of_different_meshes():
     branch = fm.trace(own, over=HEIGHT, hold={"volume": 1.0}, until={HEIGHT: 0.45}, max_steps=25)
     assert branch.status == "converged"
     assert branch[-1].pressure == pytest.approx(fm.equilibrium(plate(0.45, 12, material=rubber, degree=3), volume=1.0).pressure, rel=1e-9)
+
+
+def test_each_equilibrium_has_the_scales_and_the_analyses_of_the_scene_given():
+    """By hand: mu T/R0 = 8 kPa, mu T R0 = 5 N, R0 = 25 mm; total stresses know R0/T = 50."""
+    scales = fm.Scales(radius=0.025, thickness=5e-4, shear_modulus=4e5)
+    asked = fm.Analysis(stability=("pressure",))
+    before = plate(0.5, 8, scales=scales, analysis=asked, title="plate", sources=[fm.Dipole(1e-4, 2.0)], susceptibility=0.5)
+    traced = fm.trace(before, over=HEIGHT, hold={"pressure": 0.8}, until={HEIGHT: 0.3})
+    assert [point.kind for point in traced.special_points][:1] == ["touch"]
+    for branch in (traced, fm.vary(before, HEIGHT, [0.5, 0.3], hold={"pressure": 0.8})):
+        for name, unit in (("pressure_pa", 8e3), ("volume_m3", 0.025**3), ("contact_force_n", 5.0), ("contact_radius_m", 0.025)):
+            scaled = branch.column(name.rpartition("_")[0])  # a free membrane has no radius of contact
+            np.testing.assert_allclose(branch.column(name), unit * scaled, rtol=1e-12, equal_nan=True)
+            assert np.isfinite(scaled[-1])
+        for eq in (branch[-1], *(point.equilibrium for point in branch.special_points or ())):
+            number = eq.number(HEIGHT)
+            assert eq.scene.replace(run=None, obstacles=before.obstacles) == before
+            assert eq.scene.obstacles == (fm.Plane(number),)
+        own = fm.equilibrium(plate(0.3, 8, scales=scales, sources=before.sources, susceptibility=0.5), pressure=0.8, start=branch[-1])
+        assert branch[-1].profile()["total_stress_1"] == pytest.approx(own.profile()["total_stress_1"], rel=1e-6)

@@ -227,3 +227,18 @@ def test_an_equilibrium_beyond_the_limit_point_names_it():
     for pressure in (5.0, -5.0):
         with pytest.raises(fm.SolveError, match=f"the limit point is P = {np.copysign(limit.pressure, pressure):.6g}"):
             fm.equilibrium(scene, pressure=pressure)
+
+
+def test_a_value_out_of_reach_is_said_in_its_unit_and_with_the_maximum_before_it():
+    """By hand: mu T/R0 = 8 kPa, R0^3 = 15.625 ml. The pressure of a neo-Hookean disc falls to 0 behind its limit point."""
+    scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(8), scales=fm.Scales(radius=0.025, thickness=5e-4, shear_modulus=4e5))
+    until = {"pressure": 7.5}
+    branch = fm.trace(scene, start=1.0, until=until, max_steps=40)
+    top = branch.special_points[0]
+    said = f"without meeting pressure 7.5 (60 kPa); the pressure has a maximum of {top.pressure:.6g} ({8 * top.pressure:.4g} kPa)"
+    assert branch.message == f"40 steps were made {said} at a limit point, and falls since"
+    assert "the pressure has a maximum near" in fm.trace(scene, start=1.0, until=until, max_steps=40, special_points=False).message
+    short = fm.trace(scene.replace(scales=None), start=1.0, until=until, max_steps=3)
+    assert short.message == "3 steps were made without meeting pressure 7.5"
+    one_ahead = fm.trace(scene, start=1.0, until={**until, "volume": 1e3}, max_steps=40)
+    assert "maximum" not in one_ahead.message

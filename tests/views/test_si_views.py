@@ -12,6 +12,7 @@ import pytest
 import femmembrane as fm
 from femmembrane.errors import InputError
 from femmembrane.quantities import SCALED, Units, axis_label, caption, heading_in
+from femmembrane.scene.number_units import shown_number
 from femmembrane.views import explorer_data, plots
 from femmembrane.views.report import report
 from tests.cases import disc_scene
@@ -124,3 +125,55 @@ def test_heights_of_a_flat_shape_do_not_cover_each_other():
     shown = sorted(tuple(box.intervaly) for box in boxes if low - 1 <= sum(box.intervaly) / 2 <= high + 1)
     assert len(shown) >= 2
     assert all(below[1] <= above[0] for below, above in pairwise(shown))
+
+
+def test_numbers_of_a_scene_are_shown_in_si_units():
+    """By hand: R0 = 20 mm, mu T R0 = 2.4 N, mu T/R0 = 6 kPa; moments are 4 pi R0^3 sqrt(M mu/mu0) by eq. 33 of the paper."""
+    scene = fm.Scene(
+        material=fm.NeoHookean(),
+        mesh=fm.disc(4),
+        sources=[fm.Dipole(4.0, 1.5), fm.Uniform(4.0)],
+        obstacles=[fm.Ball(3.0, 0.5)],
+        chamber=fm.Chamber(volume=2.0, atmosphere=16.0),
+        electric=fm.Electric(voltage=2000.0, relative_permittivity=3.0),
+        susceptibility=0.5,
+        scales=SCALES,
+    )
+    units = Units.of("si", SCALES)
+    moment = 4 * np.pi * 0.02**3 * np.sqrt(4.0 * 4e5 / 1.25663706e-6)
+    flux_density = np.sqrt(4.0 * 4e5 * 1.25663706e-6)
+    for key, label, value, shown in (
+        ("source.0.height", "height of the source in mm", 1.5, 30.0),
+        ("obstacle.0.height", "height of the obstacle in mm", 3.0, 60.0),
+        ("obstacle.0.radius", "obstacle.0.radius in mm", 0.5, 10.0),
+        ("chamber.volume", "chamber.volume in ml", 2.0, 16.0),
+        ("chamber.atmosphere", "chamber.atmosphere in kPa", 16.0, 96.0),
+        ("source.0.strength", "strength of the source in A m²", 4.0, moment),
+        ("source.1.strength", "strength of the source in T", 4.0, flux_density),
+        ("electric.voltage", "voltage in V", 2000.0, 2000.0),
+        ("membrane.susceptibility", "susceptibility χ", 0.5, 0.5),
+    ):
+        found = shown_number(scene, key, units)
+        assert (found.label, float(found.into(value))) == (label, pytest.approx(shown, rel=1e-8)), key
+        plain = shown_number(scene, key, SCALED)
+        assert float(plain.into(value)) == value
+        assert " in " not in plain.label or key == "electric.voltage"
+
+
+def test_axes_over_a_number_are_in_its_unit():
+    key, scene = "source.0.height", disc_scene(dipole=(1, 4.5), elements=4).replace(scales=SCALES)
+    over = fm.trace(scene, over=key, hold={"pressure": 1.0}, until={key: 3.0}, max_steps=60)
+    _, axes = plots.new_figure((4, 3))
+    plots.draw_branch(axes, over, across=key, up="pressure", units="si")
+    assert axes.get_xlabel() == "height of the source in mm"
+    line = next(line for line in axes.lines if len(line.get_xdata()) > 2)
+    assert (line.get_xdata()[0], line.get_xdata()[-1]) == (pytest.approx(90.0), pytest.approx(60.0))
+    data = explorer_data.page_data(over, "si", shapes=False)
+    place = [item["name"] for item in data["quantities"]].index(key)
+    assert data["quantities"][place]["label"] == "height of the source in mm"
+    _, axes = plots.new_figure((4, 3))
+    fm.sweep(scene.replace(run=fm.Run(control="pressure", values=(0.5,))), {key: [4.0, 4.5]}, quantity="run").plot(
+        ax=axes, units="si", show=["steps"]
+    )
+    assert axes.get_xlabel() == "height of the source in mm"
+    assert axes.lines[0].get_xdata() == pytest.approx([80.0, 90.0])

@@ -57,7 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     axes.legend(fontsize=8, frameon=False)
     save_figure(figure, asked.out / "materials.png")
 
-    start = fm.trace(scene(fm.MooneyRivlin(0.05)), start=0.5, until={"volume": LARGEST}).special_points[0]
+    branch = fm.trace(scene(fm.MooneyRivlin(0.05)), start=0.5, until={"volume": LARGEST})
+    start = next(point for point in branch.special_points if point.kind == "limit_point")
     curve = fm.fold_curve(scene(fm.MooneyRivlin(0.05)), start=start, parameter="material.ratio", bounds=(0.05, 0.1))
     (cusp,) = curve.cusps
     print(f"\nMooney-Rivlin's limit point is lost at C2/C1 = {cusp.value:.6f} (V = {cusp.volume:.4f}, P = {cusp.pressure:.5f})")

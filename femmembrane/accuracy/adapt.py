@@ -181,7 +181,8 @@ class Choice:
 
     def not_met(self, best: float) -> SolveError:
         asked = f"mesh.accuracy = {in_words(self.accuracy)}"
-        message = f"{asked} is not met by {self.most} elements of degree {self.degree}; the best estimate is {best:.1e}"
+        close = ", too close to it for an estimate" if best <= by_quantity(self.accuracy).tightest else ""
+        message = f"{asked} is not met by {self.most} elements of degree {self.degree}; the best estimate is {best:.1e}{close}"
         return SolveError(message, status=Status.ACCURACY_NOT_MET)
 
 

@@ -194,7 +194,9 @@ class Magnet(Source):
         return Jet(*(amplitude * part for part in parts))
 
     def distance_squared(self, rho: Any, eta: Any) -> Any:
-        """See :meth:`.Source.distance_squared`: from the body, 0 inside it."""
+        """See :meth:`.Source.distance_squared`: from the body, 0 inside it; infinite with ``body``, since contact goes on there."""
+        if self.body:
+            return np.full(np.broadcast(rho, eta).shape, np.inf)
         across = np.maximum(np.maximum(rho - self.radius, self.inner_radius - rho), 0.0)
         along = np.maximum(np.abs(eta - self.height) - self.length / 2, 0.0)
         return across**2 + along**2

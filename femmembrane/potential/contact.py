@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 NO_FORCE = 1e-11
 #: and that is too little to say whether a perturbation would lift the node off
 _WEAK = 1e-8
+#: gap over the size of the membrane that a located touch may leave
+_TOUCH = 1e-12
 #: part of its neighbour's normal by which a node must be able to move for a body to hold it
 ACROSS = 1e-6
 
@@ -222,14 +224,16 @@ class ContactEvaluation(Evaluation):
         inner = cast("Mask", np.stack([on[j : j + degree * n_elements : degree] for j in range(degree + 1)]).all(axis=0))
         return inner if self.held.any() and inner.any() else None
 
-    def released(self) -> ContactEvaluation | None:
-        potential = cast(ContactPotential, self.potential)
+    def touched(self) -> tuple[ContactEvaluation, ContactEvaluation] | None:
+        potential, gaps = cast(ContactPotential, self.potential), self.gaps
         u, w = self._raw.force_scale(0.0)
-        least = _WEAK * (np.abs(self.gaps.n_rho) * u + np.abs(self.gaps.n_eta) * w)
-        weak = self.held & (potential.with_poles(self.forces) <= least)
+        least = _WEAK * (np.abs(gaps.n_rho) * u + np.abs(gaps.n_eta) * w)
+        forces = potential.with_poles(potential.normal_forces(self._raw, gaps))
+        weak = (np.abs(gaps.gap) <= _TOUCH * potential.space.unit) & (np.abs(forces) <= least) | (self.held & (forces <= least))
         if not weak.any():
             return None
-        return ContactEvaluation(self._raw, potential, self.gaps, self.held & ~weak)
+        free, held = (ContactEvaluation(self._raw, potential, gaps, kept) for kept in (self.held & ~weak, self.held | weak))
+        return free, held
 
     def holds(self, unknown: int) -> bool:
         return bool((self.reduction.out == unknown).any())
@@ -387,7 +391,7 @@ class ContactPotential(FollowingPotential):
         raw = super().evaluate(x, pressure)
         gaps = self.gaps(raw.x)
         held = ContactEvaluation(raw, self, gaps, gaps.close)
-        return held.released() or held, held
+        return held.touched() or (held, held)
 
     def _round_off(self, raw: Evaluation, gaps: Gaps, pressure: float) -> Array:
         """Normal forces at the nodes that are round-off: on a nearly flat membrane those along the axis are much smaller than others."""

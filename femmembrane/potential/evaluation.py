@@ -125,8 +125,8 @@ class Evaluation:
         """Which elements lie on a body all over, shape (n_elements,), so that no short wave lifts them; None where none does."""
         return None
 
-    def released(self) -> Evaluation | None:
-        """The same state without the nodes that bodies hold by no force; None where there are none."""
+    def touched(self) -> tuple[Evaluation, Evaluation] | None:
+        """The same state without the nodes that bodies touch with no force, and with these held; None where there are none."""
         return None
 
     def holds(self, unknown: int) -> bool:

@@ -250,7 +250,7 @@ class Branch(Sequence[Equilibrium]):
         ----------
         of : str or list of str
             As for :meth:`.Equilibrium.sensitivity`; or ``limit_pressure``, ``limit_volume``, ``limit_height`` of the first limit point.
-            Any other one is asked of itself: ``branch.special_points[1].sensitivity(...)``.
+            Any other one of ``branch.special_points`` is asked of itself: ``point.sensitivity(...)``.
         to, held, r, control, azimuthal
             As for :meth:`.Equilibrium.sensitivity`; over a number of the scene, what the run holds is held by default. At a limit point
             nothing is held.

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..potential import Array, Potential
+    from ..potential import Array, Evaluation, Potential
     from ..scene import Scene
     from ..solve.controls import Control, Gas
     from ..solve.sensitivity import Rates, Sensitive
@@ -124,11 +124,20 @@ def eigenvalue_rates(
     azimuthal: int,
     moved: Callable[[int, float], tuple[Scene, Array, float]],
     step: Callable[[int], float],
+    at: Callable[[tuple[Scene, Array, float]], tuple[Potential, Evaluation]],
 ) -> Array:
     """See :func:`femmembrane.stability.eigenvalue_rates.eigenvalue_rates`."""
     from ..stability.eigenvalue_rates import eigenvalue_rates
 
-    return eigenvalue_rates(eq, known, rates, control, azimuthal, moved, step)
+    return eigenvalue_rates(eq, known, rates, control, azimuthal, moved, step, at)
+
+
+def holding(scene: Scene, evaluation: Evaluation) -> Potential:
+    """The potential of a scene with the nodes held that bodies hold in an evaluation."""
+    from ..potential import potential_of
+    from ..stability.azimuthal_operator import on_set
+
+    return on_set(potential_of(scene), evaluation) if scene.bodies else potential_of(scene)
 
 
 # --- pictures and pages

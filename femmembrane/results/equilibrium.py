@@ -455,8 +455,9 @@ class Equilibrium:
         of : str or list of str
             ``pressure``, ``volume``, ``center_height``, ``gas_amount``; ``energy``, ``elastic_energy``, ``magnetic_energy``,
             ``load_energy``, ``electric_energy``; ``voltage``, ``charge``, ``capacitance``, ``electric_field``; ``eigenvalue``, the smallest
-            one; columns of :meth:`profile`: ``rho``, ``eta``, ``stretch_1``, ``total_stress_2``, ... Of a scene with scales those with
-            ``_pa``, ``_m``, ... as well, while the scales stay.
+            one; columns of :meth:`profile`: ``rho``, ``eta``, ``stretch_1``, ``total_stress_2``, ...; on a body ``contact_radius``,
+            ``contact_reference_radius``, ``contact_force``, ``contact_area``. Of a scene with scales those with ``_pa``, ``_m``, ... as
+            well, while the scales stay.
         to : str or list of str
             Numbers of the scene by the names of :mod:`femmembrane.scene.variation`, such as ``material.ratio`` or ``source.0.height``.
             Numbers that go with one, as other moduli of Ogden's material do, go with it here too. Of a scene with scales
@@ -479,10 +480,14 @@ class Equilibrium:
         InputError
             For an unknown quantity or number, for a number that is not continuous, and for a multiple eigenvalue.
         SolveError
-            At a fold of what is held, where nothing has a derivative, and for an interpolated state.
+            At a fold of what is held, where nothing has a derivative, where a body is touched without a force, whose two sides differ,
+            and for an interpolated state.
 
         Notes
         -----
+        Beside bodies the nodes that are held stay held, and the borders of contact move (:mod:`femmembrane.solve.beside`). At a border the
+        slope of a profile jumps: a place there has the derivative of the element behind it.
+
         In a tension field that is wrinkled in part, answers on a mesh are smooth by pieces: their slopes change by a little where the
         border of the wrinkles passes a quadrature point.
 

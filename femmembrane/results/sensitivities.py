@@ -20,14 +20,16 @@ from ..errors import InputError, SolveError, Status, unknown_name
 from ..quantities import PROFILE, quantity
 from ..scene.run import GAS, PRESCRIBED
 from ..scene.variation import Scale
+from ..solve.beside import BesideBodies, sensitive
 from ..solve.controls import CONTROLS, Control, check_height
-from ..solve.sensitivity import FOLDS, Rates, Sensitive, differentiated, sensitive
+from ..solve.sensitivity import FOLDS, Rates, Sensitive, differentiated
 from ..solve.state import inner
 from . import door
+from .contact import contact_of
 from .equilibrium import electric_of
 
 if TYPE_CHECKING:
-    from ..potential import Potential
+    from ..potential import Evaluation, Potential
     from ..scene import Scene
     from .branch import Branch
     from .equilibrium import Equilibrium
@@ -40,8 +42,9 @@ HELD = {**{name: name for name in CONTROLS}, **PRESCRIBED, GAS: GAS}
 _ENERGIES = {f"{name}_energy": name for name in ("elastic", "magnetic", "load", "electric")}
 _ELECTRIC = ("voltage", "charge", "capacitance", "electric_field")
 _PROFILE = ("rho", "eta", *PROFILE)
+_CONTACT = ("contact_radius", "contact_reference_radius", "contact_force", "contact_area")
 #: what can be differentiated
-DIFFERENTIABLE = (*CONTROLS, "gas_amount", "energy", *_ENERGIES, *_ELECTRIC, "eigenvalue", *_PROFILE)
+DIFFERENTIABLE = (*CONTROLS, "gas_amount", "energy", *_ENERGIES, *_ELECTRIC, "eigenvalue", *_PROFILE, *_CONTACT)
 #: names of quantities of the first limit point of a branch, and what they are there
 OF_LIMIT = {"limit_pressure": "pressure", "limit_volume": "volume", "limit_height": "center_height"}
 #: step of differences of explicit formulas, relative to the number and to the membrane's own size
@@ -64,6 +67,7 @@ class _Derived:
 
     def __init__(self, eq: Equilibrium, potential: Potential, known: Sensitive, rates: Rates, along: Along) -> None:
         self.eq, self.potential, self.known, self.rates, self.along = eq, potential, known, rates, along
+        self._evaluation = potential.evaluate(eq.state, eq.pressure)
         self._profiles: list[dict[str, Array]] | None = None
 
     def of(self, name: str) -> list[Answer]:
@@ -78,6 +82,8 @@ class _Derived:
 
     def _value(self, name: str) -> Answer:
         """The quantity itself."""
+        if name in _CONTACT:
+            return float(getattr(self.eq.contact, name.removeprefix("contact_")))
         if name not in _PROFILE:
             return float(getattr(self.eq, name))
         return self.eq.profile(self.along.r)[name]
@@ -105,8 +111,13 @@ class _Derived:
             return _floats(self._energy(name))
         if name in _ELECTRIC:
             return [float(v) for v in self._explicit(lambda moved: np.array(_electric(moved, name)))]
+        if name in _CONTACT:
+            if eq.contact is None or not eq.contact.touching:
+                raise InputError("of", name, "allowed where a body is touched")
+            return [float(v) for v in self._explicit(lambda moved: np.array(self._contact(moved, name)))]
         if name == "eigenvalue":
-            return _floats(door.eigenvalue_rates(eq, self.known, rates, self.along.control, self.along.azimuthal, self.moved, self.step))
+            against = self.along.control, self.along.azimuthal
+            return _floats(door.eigenvalue_rates(eq, self.known, rates, *against, self.moved, self.step, self.at))
         if self._profiles is None:
             self._profiles = self._profile_rates()
         return [columns[name] for columns in self._profiles]
@@ -121,8 +132,8 @@ class _Derived:
         return amount
 
     def _energy(self, name: str) -> Array:
-        if self.potential.charged is not None:
-            return np.array([float(v) for v in self._explicit(lambda moved: np.array(_energy(moved, name)))])
+        if self.potential.charged is not None or self.eq.scene.bodies:
+            return np.array([float(v) for v in self._explicit(lambda moved: np.array(getattr(self.at(moved)[1], name)))])
         parts = self.known.energies(self.eq.state, self.eq.pressure)
         wanted = parts if name == "energy" else [_ENERGIES[name]]
         total = np.zeros(len(self.known.names))
@@ -140,10 +151,29 @@ class _Derived:
         return _STEP * min(value or 1.0, 1 / move if move else np.inf)
 
     def moved(self, k: int, t: float) -> tuple[Scene, Array, float]:
-        """Scene and state after number k has changed by t, to first order."""
+        """Scene and state after number k has changed by t, to first order; beside bodies its held nodes are on these."""
         parameter = self.known.parameters[k]
         scene = parameter.scene_at(parameter.value + t) if t else self.eq.scene
-        return scene, self.eq.state + t * self.rates.x[:, k], self.eq.pressure + t * float(self.rates.pressure[k])
+        x = self.eq.state + t * self.rates.x[:, k]
+        if isinstance(self.known, BesideBodies):
+            borders = self._borders(k, t)
+            scene, x = scene.bordered(borders), self.known.placed(self._evaluation, k, t, x, borders)
+        return scene, x, self.eq.pressure + t * float(self.rates.pressure[k])
+
+    def _borders(self, k: int, t: float) -> tuple[tuple[int, float], ...]:
+        """Ends of elements that follow borders of contact after number k has changed by t."""
+        rates = self.rates.borders
+        if rates is None:
+            return ()
+        return tuple((end, s + t * float(rate)) for (end, s), rate in zip(self.eq.scene.borders, rates[:, k], strict=True))
+
+    def at(self, moved: tuple[Scene, Array, float]) -> tuple[Potential, Evaluation]:
+        """Potential and evaluation of a moved state, with the same nodes held."""
+        potential = door.holding(moved[0], self._evaluation)
+        return potential, potential.evaluate(moved[1], moved[2])
+
+    def _contact(self, moved: tuple[Scene, Array, float], name: str) -> float:
+        return float(getattr(contact_of(self.at(moved)[1]), name.removeprefix("contact_")))
 
     def _explicit(self, formula: Callable[[tuple[Scene, Array, float]], Array]) -> list[Array]:
         return [differentiated(lambda t, k=k: formula(self.moved(k, t)), self.step(k)) for k in range(len(self.known.names))]  # type: ignore[misc]
@@ -155,7 +185,23 @@ class _Derived:
             columns = door.profile_at(*moved, s).columns()
             return np.stack([columns[name] for name in shown])
 
-        return [dict(zip(shown, found, strict=True)) for found in self._explicit(rows)]
+        found = self._explicit(rows)
+        for k in range(len(found)):
+            self._one_sided(found[k], k, s, rows)
+        return [dict(zip(shown, each, strict=True)) for each in found]
+
+    def _one_sided(self, found: Array, k: int, s: Array, rows: Callable[[tuple[Scene, Array, float]], Array]) -> None:
+        """Take the side on which a border of contact goes away from a place that it sweeps over: slopes jump there."""
+        step, here = self.step(k), self.eq.scene.borders
+        for sign in (1.0, -1.0):
+            swept = np.zeros(s.shape, dtype=bool)
+            for (_, a), (_, b) in zip(here, self._borders(k, sign * step), strict=False):
+                reach = 2 * abs(b - a)
+                # a place at the border itself belongs to the element behind it
+                swept |= (np.abs(s - a) <= reach) & ((s >= a) if b < a else (s < a))
+            if swept.any():
+                own = differentiated(lambda t, sign=sign: rows(self.moved(k, sign * abs(t))) * sign, step, sided=True)  # type: ignore[misc]
+                found[:, swept] = own[:, swept]
 
 
 def _floats(values: Array) -> list[Answer]:
@@ -164,12 +210,6 @@ def _floats(values: Array) -> list[Answer]:
 
 def _electric(moved: tuple[Scene, Array, float], name: str) -> float:
     return electric_of(*moved[:2])[name]
-
-
-def _energy(moved: tuple[Scene, Array, float], name: str) -> float:
-    from ..potential import potential_of
-
-    return float(getattr(potential_of(moved[0]).evaluate(moved[1], moved[2]), name))
 
 
 def sensitivity_of(eq: Equilibrium, of: Any, to: Any, held: str | None, along: Along) -> Any:
@@ -249,8 +289,6 @@ def _listed(key: str, given: Any) -> tuple[str, ...]:
 
 def _known(scene: Scene, to: Any) -> Sensitive:
     """The derivatives of the equations of a scene with respect to numbers that it has."""
-    if scene.bodies:
-        raise InputError("to", to, "sensitivities are not computed beside an obstacle")
     try:
         return sensitive(scene, _listed("to", to))
     except InputError as error:

@@ -27,7 +27,7 @@ class SpecialPoint:
     kind : str
         limit_point (dP = 0), volume_fold (dV = 0), height_fold, branch_point, azimuthal_onset; over a number of the scene number_fold,
         where that is stationary; with bodies in the way touch and release; in a tension field zone_opens and zone_closes, where a zone of
-        wrinkles, or of taut membrane between wrinkles, appears or vanishes.
+        wrinkles, or of taut membrane between wrinkles, appears or vanishes. Such a zone is listed where finer elements confirm it.
     volume, pressure, center_height : float
         Of its equilibrium.
     error : float
@@ -69,7 +69,8 @@ class SpecialPoint:
         --------
         >>> import femmembrane as fm
         >>> scene = fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(6), degree=2)
-        >>> point = fm.trace(scene, start=0.5, until={"center_height": 3.0}).special_points[0]
+        >>> branch = fm.trace(scene, start=0.5, until={"center_height": 3.0})
+        >>> point = next(point for point in branch.special_points if point.kind == "limit_point")
         >>> estimate = point.error_estimate()
         >>> print(f"P = {point.pressure:.6f}, off by {estimate.pressure.error:.0e}")
         P = 1.879247, off by 7e-05
@@ -108,7 +109,7 @@ class SpecialPoint:
         --------
         >>> import femmembrane as fm
         >>> branch = fm.trace(fm.Scene(material=fm.NeoHookean(), mesh=fm.disc(16)), until={"center_height": 2.0})
-        >>> limit = branch.special_points[0]
+        >>> limit = next(point for point in branch.special_points if point.kind == "limit_point")
         >>> print(f"P = {limit.pressure:.4f}, dP/dp = {limit.sensitivity('pressure', 'membrane.prestretch'):.4f}")
         P = 1.8792, dP/dp = -1.3409
         """

@@ -96,7 +96,7 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
     with np.errstate(over="ignore", invalid="ignore"):
         held = root.pressed(x, pressure, magnetic)
     tried: set[bytes] = set()
-    spent = 0
+    spent, closing_in = 0, _ClosingIn(root)
     while True:
         tried.add(held.tobytes())
         result = once(root.holding(held), control=control, x=x, pressure=pressure)
@@ -115,12 +115,60 @@ def _on_mesh(once: Once, control: Control, root: ContactPotential, x: Array, pre
         following = root.judged(evaluation._raw, evaluation.gaps, result.pressure)
         if (following == held).all():
             return result
-        if following.tobytes() in tried:
+        if (further := closing_in.next(held, following)).tobytes() not in tried:
+            following = further
+        elif following.tobytes() in tried:
             following = _one_changed(evaluation, held, following)
         if len(tried) == MOST_SETS or following.tobytes() in tried:
             result.status = Status.NOT_CONVERGED
             return result
         x, pressure, held = result.x, result.pressure, following
+
+
+class _ClosingIn:
+    """How far borders of contact move from one set of held nodes to the next.
+
+    A border that lies too far out pulls at its last node alone. Plain sets would let one node go after the other, as many as the mesh has
+    there. So a border that lets go again lets go twice as many nodes as the time before. Where these were too many, the membrane comes into
+    the body, and the border is looked for half-way between the places that were too far out and too far in. A set is an answer only if the
+    next one is the same, however it was found.
+    """
+
+    def __init__(self, root: ContactPotential) -> None:
+        self.root = root
+        self.inner = self.outer = self.stride = np.zeros(0, dtype=np.int64)
+
+    def next(self, held: Mask, following: Mask) -> Mask:
+        """The next set, from a set and the plain one that follows from its solution."""
+        plain = _smoothed(self.root, following, True)
+        now, then = self._borders(held), self._borders(plain)
+        far = 2 * held.size  # farther out than any border
+        if now.size != then.size:
+            self.inner = np.zeros(0, dtype=np.int64)
+            return following
+        if self.inner.size != now.size:
+            self.inner, self.outer, self.stride = np.full(now.size, -far), np.full(now.size, far), np.zeros(now.size, dtype=np.int64)
+        out, back = then > now, then < now
+        # other borders have moved since: what was too far in or out need not be so any more
+        self.inner = np.where(out, now, np.where(now <= self.inner, -far, self.inner))
+        self.outer = np.where(back, now, np.where(now >= self.outer, far, self.outer))
+        middle = (self.inner + self.outer) // 2
+        closed = (self.inner > -far) & (self.outer < far)
+        least = then - np.repeat((then[::2] + then[1::2] - 1) // 2, 2)  # half of a zone stays
+        nearer = np.where(closed, np.minimum(then, middle), np.where(back, np.maximum(then - 2 * self.stride, least), then))
+        new = np.where(out | back, nearer, now)
+        self.stride = np.where(back, now - new, 0)
+        found = np.zeros_like(held)
+        for first, last in zip(-new[::2], new[1::2], strict=True):
+            found[first:last] = True
+        return found
+
+    def _borders(self, nodes: Mask) -> NDArray[np.int64]:
+        """Where zones begin, with a minus, and behind where they end: both grow outwards."""
+        at = np.flatnonzero(nodes)
+        breaks = np.flatnonzero((np.diff(at) > 1) | (np.diff(self.root.nodes[at]) > 1))
+        first, last = at[np.append(0, breaks + 1)[: at.size]], at[np.append(breaks, at.size - 1)[: at.size]]
+        return np.stack([-first, last + 1], axis=1).ravel()
 
 
 def _smoothed(root: ContactPotential, held: Mask, fill: bool) -> Mask:
@@ -308,7 +356,7 @@ def _moved(
         if result.status is not Status.CONVERGED:
             return None
         x, pressure = result.evaluation.carried(result.x), result.pressure
-        return result, _across(result, borders, inside)
+        return result, _across(cast("ContactEvaluation", result.evaluation), result.pressure, borders)
 
     places = np.clip(places, low, high)
     found = solved(places)
@@ -356,19 +404,25 @@ def _held_nodes(root: ContactPotential, zones: list[tuple[int, int]], borders: l
     return held
 
 
-def _across(result: NewtonResult, borders: list[Border], held: Mask) -> Array:
+def _across(evaluation: ContactEvaluation, pressure: float, borders: list[Border]) -> Array:
     """Forces along the normal of the elements beyond the borders, over the largest forces that meet at a node."""
-    evaluation = cast("ContactEvaluation", result.evaluation)
     potential, space = cast("ContactPotential", evaluation.potential), evaluation.potential.space
-    scales = evaluation.force_scale(result.pressure)
+    scales = evaluation.force_scale(pressure)
     found = []
     for border in borders:
         node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
         n_rho, n_eta = evaluation.gaps.n_rho[node], evaluation.gaps.n_eta[node]
-        along, across = _end_force(evaluation, result.pressure, border)
+        along, across = _end_force(evaluation, pressure, border)
         scale = abs(n_rho) * scales[0] + abs(n_eta) * scales[1]
         found.append((along * n_rho + across * n_eta) / scale)
     return np.array(found)
+
+
+def border_forces(evaluation: ContactEvaluation, pressure: float) -> Array:
+    """What vanishes at each border that an end of elements follows, shape (k,): see :func:`_across`."""
+    potential = cast("ContactPotential", evaluation.potential)
+    place, degree = {int(node): k for k, node in enumerate(potential.nodes)}, potential.space.degree
+    return _across(evaluation, pressure, [Border(end, not evaluation.held[place[end * degree + 1]]) for end, _ in potential.borders])
 
 
 @dataclass(frozen=True, eq=False)
@@ -436,7 +490,8 @@ def _at_end(potential: ContactPotential, evaluation: ContactEvaluation, pressure
     They count the volume below an element, or beside it, so that its variation has a part at its ends. Two neighbours' parts cancel.
     """
     space = potential.space
-    rho, eta = space.end_position(evaluation.x, border.end)
+    node = int(np.flatnonzero(potential.nodes == border.end * space.degree)[0])
+    rho, eta = (float(part[node]) for part in potential.positions(evaluation.x, evaluation.factor))
     turn = 2 * np.pi * space.side * (-1.0 if border.before else 1.0)  # the element beyond the border begins, or ends, there
     load = potential.edge_load(evaluation, eta)
     if space.lids:

@@ -138,6 +138,8 @@ def _inflated_to_bodies(potential: ContactPotential, volume: float) -> State:
         if state is not None and potential.touching(state.x) > 0:
             break
         if first == rest:
+            if state is None:
+                raise SolveError("the membrane without load was not found", status=Status.NOT_CONVERGED)
             raise SolveError("the membrane without load touches a body", status=Status.NO_EQUILIBRIUM)
         first = rest + (first - rest) / 4
     else:

@@ -244,7 +244,8 @@ def trace_points(problem: CurveProblem[Point], point: Point, tracer: Tracer) -> 
                 message = f"no step longer than {control.smallest:g} converges from {problem.place(point)}"
                 if reason := coarse_at_edge(point.state.evaluation):
                     raise SolveError(f"{message}: {reason}", status=Status.NOT_RESOLVED)
-                raise SolveError(message, status=Status.STEP_UNDERFLOW)
+                near = coarse_at_edge(point.state.evaluation, edges="near")
+                raise SolveError(f"{message}; {near}" if near else message, status=Status.STEP_UNDERFLOW)
         new.state.iterations = spent
         tracer.known = new.state.correction
         path.append(new.sigma, new.z, new.tangent)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +24,7 @@ from ..kernels.interface import Border
 from ..potential import Array, Evaluation, NumberDerivatives, Numbered
 from ..scene import Scene
 from ..scene.variation import Numbers, Scale, parameter_of
+from ..threads import cached_property
 from .banded import BandFactor
 from .controls import CONTROLS, Control, Gas, GasOver
 from .state import inner
@@ -47,12 +47,15 @@ class Rates:
         Of the coefficients.
     pressure, volume, height : ndarray, shape (m,)
         The height is that of the pole.
+    borders : ndarray, shape (k, m), optional
+        Of the places of ends of elements that follow borders of contact; the coefficients belong to nodes that move with these.
     """
 
     x: Array
     pressure: Array
     volume: Array
     height: Array
+    borders: Array | None = None
 
 
 class Sensitive:
@@ -69,12 +72,15 @@ class Sensitive:
     def __init__(self, scene: Scene, names: Sequence[str]) -> None:
         self.scene, self.names = scene, tuple(names)
         self.parameters = tuple(parameter_of(scene, name) for name in self.names)
-        self._rates = rates = [parameter.rates() for parameter in self.parameters]
-        own = list(dict.fromkeys(name for rate in rates for name in rate))
-        movers = [parameter.name for parameter in Numbers(scene, tuple(own)).parameters if parameter.moves]
+        self._rates = [parameter.rates() for parameter in self.parameters]
+
+    @cached_property
+    def _groups(self) -> list[tuple[Numbered, Array]]:
+        own = list(dict.fromkeys(name for rate in self._rates for name in rate))
+        movers = [parameter.name for parameter in Numbers(self.scene, tuple(own)).parameters if parameter.moves]
         # the places of two ends have no expression in common
         groups = [[name for name in own if name not in movers[1:]], *([name] for name in movers[1:])]
-        self._groups = [(Numbered(Numbers(scene, tuple(group))), _mixed(rates, group)) for group in groups]
+        return [(Numbered(Numbers(self.scene, tuple(group))), mixed(self._rates, group)) for group in groups]
 
     def equations(self, x: Array, pressure: float) -> NumberDerivatives:
         """Derivatives of E' - P V', of the volume and of the height of the pole at fixed (x, P)."""
@@ -131,7 +137,7 @@ class Sensitive:
         own = self.equations(x, pressure)
         held = held_rates(control, pressure, own.volume, own.height) + self.held_rates(control, pressure, evaluation.volume)
         border = evaluation.border(row, corner)
-        refuse_fold(evaluation, border, control)
+        refuse_fold(evaluation, *border.solve(np.zeros_like(x), 1.0), control)
         return solved(border, evaluation, held, own)
 
     def at_fold(self, evaluation: Evaluation, pressure: float, kind: str) -> Rates:
@@ -150,7 +156,7 @@ class Sensitive:
         return solved(border, evaluation, numbers, own)
 
 
-def _mixed(rates: Sequence[dict[str, float]], group: Sequence[str]) -> Array:
+def mixed(rates: Sequence[dict[str, float]], group: Sequence[str]) -> Array:
     """How numbers of a group change with each of the numbers asked for, shape (group, m)."""
     return np.array([[rate.get(name, 0.0) for rate in rates] for name in group]).reshape(len(group), len(rates))
 
@@ -165,9 +171,8 @@ def held_rates(control: Control, pressure: float, volume: Array, height: Array) 
     return np.zeros_like(volume) if atmosphere is None else (pressure + atmosphere) * volume
 
 
-def refuse_fold(evaluation: Evaluation, border: Border, control: Control) -> None:
-    """Refuse a state that has no derivative at the held quantity, as it is stationary there."""
-    dx, dp = border.solve(np.zeros_like(evaluation.x), 1.0)
+def refuse_fold(evaluation: Evaluation, dx: Array, dp: float, control: Control) -> None:
+    """Refuse a state that has no derivative at the held quantity, as it is stationary there. (dx, dp) belong to a unit of that quantity."""
     space, name = evaluation.potential.space, held_name(control)
     unit = space.units.get(name, 1.0)
     square = inner(evaluation.potential, dx, dp, dx, dp)
@@ -206,21 +211,27 @@ def null_vector(evaluation: Evaluation, kind: str) -> tuple[Array, float]:
     return mode, 0.0 if kind == "limit_point" else q
 
 
-@lru_cache(maxsize=16)
-def sensitive(scene: Scene, names: tuple[str, ...]) -> Sensitive:
-    """:class:`Sensitive`, built once for a scene and its names."""
-    return Sensitive(scene, names)
+def differentiated(function: Callable[[float], Array], step: float, *, sided: bool = False) -> Array:
+    """Derivative at 0 of an explicit formula, by central differences extrapolated to step 0; one-sided where a side has no values.
 
-
-def differentiated(function: Callable[[float], Array], step: float) -> Array:
-    """Derivative at 0 of an explicit formula, by central differences extrapolated to step 0; one-sided where a side has no values."""
+    With ``sided`` it is one-sided, and only values at 0 and at positive steps are asked for.
+    """
+    if sided:
+        return _on_side(function, step, 1.0)
     try:
         slopes = [(function(h) - function(-h)) / (2 * h) for h in (step, step / 2, step / 4)]
-        powers: tuple[int, ...] = (4, 16)
     except InputError:
-        sign, here = _side(function, step), function(0.0)
-        slopes = [(function(sign * step / 2**k) - here) / (sign * step / 2**k) for k in range(5)]
-        powers = (2, 4, 8, 16)
+        return _on_side(function, step, _side(function, step))
+    return _extrapolated(slopes, (4, 16))
+
+
+def _on_side(function: Callable[[float], Array], step: float, sign: float) -> Array:
+    here = function(0.0)
+    slopes = [(function(sign * step / 2**k) - here) / (sign * step / 2**k) for k in range(5)]
+    return _extrapolated(slopes, (2, 4, 8, 16))
+
+
+def _extrapolated(slopes: list[Array], powers: Sequence[int]) -> Array:
     for power in powers:
         slopes = [(power * b - a) / (power - 1) for a, b in pairwise(slopes)]
     return slopes[0]

@@ -197,14 +197,11 @@ def _with_fields(potential: Potential, volume: float) -> State:
             state = follow_homotopy(Fields(potential, control), bare.x, bare.pressure)
         if state is not None:
             return state
-        if reason := coarse_at_edge(last.evaluation, anywhere=True):
-            raise SolveError(
-                f"at V = {volume:.6g} no membrane was found that the bodies stop: {reason}", status=Status.NOT_RESOLVED
-            ) from error
         touching = potential.distance_to_sources(last.x) < NEAR * potential.space.unit
+        coarse = coarse_at_edge(last.evaluation, edges="all")
         raise SolveError(
             f"{_acting(potential)} could not be turned on to their full strength at V = {volume:.6g}; "
-            "try another volume or a lower strength",
+            f"try another volume or a lower strength{f'; {coarse}' if coarse else ''}",
             status=Status.DIPOLE_CONTACT if touching else Status.NO_EQUILIBRIUM,
         ) from error
 

@@ -120,14 +120,15 @@ class Predictor:
         """z at sigma: a cubic through the last two points, or the tangent at the only one.
 
         Where ends of elements move along the branch, slopes are those of one mesh and points are on many. The cubic would magnify the
-        difference some ten times. A parabola through both points has only the change of the slopes.
+        difference some ten times. A parabola from the last point has the slopes alone.
         """
         if len(self.sigma) == 1:
             return self.point[0] + (sigma - self.sigma[0]) * self.slope[0]
         h = self.sigma[1] - self.sigma[0]
         if moving:
-            bent: Array = (self.slope[1] - self.slope[0]) * ((sigma - self.sigma[0]) * (sigma - self.sigma[1]) / (2 * h))
-            return self.point[1] + ((sigma - self.sigma[1]) / h) * (self.point[1] - self.point[0]) + bent
+            ahead = sigma - self.sigma[1]
+            bent: Array = (ahead**2 / (2 * h)) * (self.slope[1] - self.slope[0])
+            return self.point[1] + ahead * self.slope[1] + bent
         return hermite(self.point[0], self.slope[0], self.point[1], self.slope[1], (sigma - self.sigma[0]) / h, h)
 
 

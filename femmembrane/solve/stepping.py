@@ -113,7 +113,8 @@ def march(
                     raise SolveError(f"{message}: {bad}", status=bad.status, result=accepted)
                 if reason := coarse_at_edge(accepted[-1].evaluation):
                     raise SolveError(f"{message}: {reason}", status=Status.NOT_RESOLVED, result=accepted)
-                raise SolveError(message, status=Status.STEP_UNDERFLOW, result=accepted)
+                near = coarse_at_edge(accepted[-1].evaluation, edges="near")
+                raise SolveError(f"{message}; {near}" if near else message, status=Status.STEP_UNDERFLOW, result=accepted)
     return accepted[1:]
 
 

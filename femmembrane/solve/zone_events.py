@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..discretization.space import transferred
 from ..discretization.strains import strained_at
-from ..errors import SolveError
-from ..potential import Array, Potential
+from ..errors import SolveError, Status
+from ..potential import Array, Potential, potential_of
 from ..potential.following import Mark
 from .branch import BranchProblem
 from .end_strains import strains_at_ends
+from .finer_space import counterpart
 from .segment import Located, Segment
 from .state import State
 from .wellposed import apparent
-from .zone_strains import BITS, Runs, Strains
+from .zone_strains import BITS, HOOP, MERIDIAN, Runs, Strains
 
 if TYPE_CHECKING:
     from ..potential.following import WrinklingPotential
@@ -38,6 +40,8 @@ _MOST_LOOKS = 24
 _SINGLE = 0.25
 #: share of a segment over which the slope of a strain is measured
 _AHEAD = 1e-4
+#: segments, and length of arc, on both sides within which an event of a finer space is the same one
+_FAR, _NEAR = 2.0, 1e-3
 
 
 @dataclass(slots=True)
@@ -69,7 +73,8 @@ Own = Callable[[State], State]
 def zone_events(segment: Segment[Any], own: Own) -> list[ZoneEvent]:
     """The points of a segment where zones of a tension field open or close.
 
-    Where a state is slack, what a mesh shows depends on the mesh, and nothing is looked for.
+    Where a state is slack, what a mesh shows depends on the mesh, and nothing is looked for. An event that a finer space does not
+    have as well, or whose state is not found there, is left out: it may be the mesh's.
 
     Parameters
     ----------
@@ -81,7 +86,7 @@ def zone_events(segment: Segment[Any], own: Own) -> list[ZoneEvent]:
         return []
     ends = [Strains(own(point.state).evaluation) for point in (segment.a, segment.b)]
     events: list[ZoneEvent] = []
-    for component in (0, 1):
+    for component in (MERIDIAN, HOOP) if ends[0].potential.tilts else (HOOP,):  # without tension along the meridian it is slack
         if _alike(ends[0].screened[component], ends[1].screened[component], _ROUGH ** ends[0].space.degree):
             continue
         if any(apparent(strains.potential, strains.evaluation) is not None for strains in ends):
@@ -179,7 +184,7 @@ class _Search:
         try:
             found = self._single(low, a, high, b)
             if found is not None and (event := self._located(found)) is not None:
-                return [event]
+                return [event] if self._holds(found, event) else []
             self.looks += 1
             if self.looks > _MOST_LOOKS:
                 return []
@@ -226,6 +231,47 @@ class _Search:
         if self.follows and (exact := self._followed(found, located.point, place)) is not None:
             located, place = exact
         return self._event(located, found, self.of(located.point), place)
+
+    def _holds(self, found: _Found, event: ZoneEvent) -> bool:
+        """Whether the zone appears or vanishes in a finer space as well, next to where it does on this mesh.
+
+        Slopes of elements err most at their ends, where a coarse mesh may show a zone that the membrane does not have. In the finer space
+        the strain of the zone has to have the right signs on both sides of the event, as far from it as that strain itself says.
+        """
+        share = (event.point.sigma - self.segment.a.sigma) / self.segment.length
+        try:
+            here, near = (self.of(self.plain.at(s)) for s in (share, share + (_AHEAD if share < 0.5 else -_AHEAD)))
+            slope = abs(self._extreme(near, found)[1] - self._extreme(here, found)[1]) / _AHEAD
+            off = abs(self._extreme(self._finer(share), found)[1])
+            if not (slope and 2 * off <= max(_FAR, _NEAR / self.segment.length) * slope):
+                return False
+            reach = 2 * off / slope + _AHEAD
+            without, with_zone = (self._finer(share + side * reach) for side in ((-1, 1) if found.opens else (1, -1)))
+        except SolveError:  # not found in a finer space, or slack there
+            return False
+        absent, present = ((self._extreme(strains, found)[1] < 0) == found.negative for strains in (without, with_zone))
+        return present and not absent and (found.end is not None or self._apart(with_zone, found))
+
+    def _apart(self, strains: Strains, found: _Found) -> bool:
+        """Whether a zone ends within its part of the meridian: else it may be a neighbour whose border has come there."""
+        beside = strains.at(np.array([found.left, found.right]))[self.component] < 0
+        return not (beside == found.negative).any()
+
+    def _finer(self, share: float) -> Strains:
+        """Strains at a share of the segment in a finer space, whose elements follow no borders."""
+        point = self.plain.at(share)
+        state = self.own(point.state)
+        own, evaluation = state.evaluation.potential, state.evaluation
+        if own.follows:
+            plain = potential_of(own.scene.replace(follow_borders=False, borders=()))
+            x = transferred(own.space, evaluation.x, plain.space)
+            own, evaluation = plain, plain.evaluate(x, state.pressure, evaluation.factor)
+        found = counterpart(own, evaluation, state.pressure, level=2)
+        if found is None:
+            raise SolveError("the equilibrium was not found in a finer space", status=Status.NOT_CONVERGED)
+        if apparent(found.evaluation.potential, found.evaluation) is not None:
+            raise SolveError("the membrane is slack in a finer space", status=Status.SLACK)
+        return Strains(found.evaluation)
 
     def _extreme(self, strains: Strains, found: _Found) -> tuple[float, float]:
         """Where the strain of a zone is farthest on the side that the zone is on, and its value there."""

@@ -21,12 +21,12 @@ from ..solve.pull_in import shears_in
 from ..solve.wellposed import UNCONFIRMED, compressed, ill_posed, interval, least_stress
 from ..threads import one_thread
 from .acoustic import elliptic_in_plane, supporting_all
-from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves
+from .azimuthal_operator import AzimuthalOperator, azimuthal_operator, check_waves, on_set
 from .bending import Bending
 from .mode_resolution import unresolved, unresolved_bending, unresolved_stress
 from .second_variation import pairs_of
 from .spectrum import SmallestEigenvalue, lowest_of, smallest_of
-from .verdict import against, short_wave_verdict, slack_all_over, slack_verdict, verdict_from
+from .verdict import against, between, short_wave_verdict, slack_all_over, slack_verdict, verdict_from
 from .wave_unknowns import azimuthal_shape, wave_unknowns
 
 #: smallest eigenvalue at a located onset, over the terms that cancel in it
@@ -132,8 +132,11 @@ def azimuthal_verdict(potential: Potential, x: Array, pressure: float, n: int, g
     if wrinkles:
         where = "; ".join(wrinkle.where for wrinkle in wrinkles)
         return short_wave_verdict(where, any(wrinkle.confirmed for wrinkle in wrinkles), None, operator.n)
-    found = _smallest(operator, guess)
     shape = partial(azimuthal_shape, potential.space, operator.n)
+    if (touched := evaluation.touched()) is not None:
+        free, held = (_smallest(azimuthal_operator(on_set(potential, state), x, pressure, n), guess) for state in touched)
+        return between(held, free, against(None, operator.n), None, operator.n, shape)
+    found = _smallest(operator, guess)
     # compression that is the mesh's alone says that the mesh is not to be trusted
     sharp = not potential.scene.tension_field and operator.bending is None
     false = sharp and any(least_stress(evaluation, component, supporting_all) for component in (0, 1))

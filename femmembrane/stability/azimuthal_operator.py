@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..checks import whole
 from ..discretization.harmonics import AROUND, RADIAL, VERTICAL
 from ..discretization.space import Space
-from ..potential import Array, Potential
+from ..potential import Array, Evaluation, Potential
 from ..potential.contact import Reduction
 from .bending import Bending, bending_form, widened
 from .mode_resolution import small_eigenvalue
@@ -147,6 +147,11 @@ def azimuthal_operator(potential: Potential, x: Array, pressure: float, n: int) 
     return AzimuthalOperator(
         band, mass, kd, layout.numbers, int(n), response, space, density, rigid, spin, spring, bending=bending, reduction=reduction
     )
+
+
+def on_set(potential: Potential, evaluation: Evaluation) -> Potential:
+    """The potential with the nodes held that bodies hold in an evaluation."""
+    return cast("ContactPotential", potential).holding(cast("ContactEvaluation", evaluation).held)
 
 
 def _against_bodies(

@@ -15,6 +15,7 @@ from ..results.verdict import Verdict
 from ..scene import ALL, MAX_WAVES
 from ..solve.finer_space import counterpart
 from .azimuthal import azimuthal_verdict
+from .azimuthal_operator import on_set
 from .mode_resolution import small_eigenvalue
 from .spectrum import SpectrumError
 from .verdict import CONTROLS, against, axisymmetric_verdict, in_words
@@ -78,8 +79,11 @@ def _worst_verdict(potential: Potential, x: Array, pressure: float, evaluation: 
     first = checked_verdict(potential, x, pressure, evaluation, control, 1)
     if first.coefficients is None:  # shorter waves are worse without end, or nothing can be said
         return first
+    # where a body is touched without a force the lower bound counts
+    touched = evaluation.touched()
+    searched = potential if touched is None else on_set(potential, touched[0])
     try:
-        n, limit = worst_waves(potential, x, pressure, evaluation)
+        n, limit = worst_waves(searched, x, pressure, evaluation if touched is None else touched[0])
     except SpectrumError as error:
         return Verdict(None, np.nan, np.nan, control, 1, None, f"not decided: {error}")
     verdict = first if n == 1 else checked_verdict(potential, x, pressure, evaluation, control, n)

@@ -30,11 +30,21 @@ if TYPE_CHECKING:
 _SIMPLE = 1e-6
 
 #: scene and state after number k has changed by t
-Moved = Callable[[int, float], tuple[Scene, Array, float]]
+State = tuple[Scene, Array, float]
+Moved = Callable[[int, float], State]
+#: potential and evaluation of such a state, with the same nodes held by bodies
+At = Callable[[State], tuple[Potential, Evaluation]]
 
 
 def eigenvalue_rates(
-    eq: Equilibrium, known: Sensitive, rates: Rates, control: str | None, azimuthal: int, moved: Moved, step: Callable[[int], float]
+    eq: Equilibrium,
+    known: Sensitive,
+    rates: Rates,
+    control: str | None,
+    azimuthal: int,
+    moved: Moved,
+    step: Callable[[int], float],
+    at: At,
 ) -> Array:
     """Derivatives of the smallest eigenvalue with respect to the numbers, shape (m,).
 
@@ -47,8 +57,8 @@ def eigenvalue_rates(
         What is held against axisymmetric perturbations.
     azimuthal : int
         Number of waves around the axis.
-    moved, step : callable
-        The state after a small change of a number, and how small.
+    moved, step, at : callable
+        The state after a small change of a number, how small, and the potential and its evaluation there.
 
     Raises
     ------
@@ -63,11 +73,10 @@ def eigenvalue_rates(
         if control is not None:
             raise InputError("control", control, f"n = {n} waves do not change the volume: leave the control out")
         verdict = _known(azimuthal_verdict(eq.potential, eq.state, eq.pressure, n))
-        pencil = azimuthal_operator(eq.potential, eq.state, eq.pressure, n).pencil()
-        require_simple(pencil, verdict)
-        return _differences(
-            lambda state: azimuthal_operator(potential_of(state[0]), state[1], state[2], n).pencil(), verdict, known, moved, step
-        )
+        operator = azimuthal_operator(eq.potential, eq.state, eq.pressure, n)
+        require_simple(operator.pencil(), verdict)
+        mode = operator.reduced(np.asarray(verdict.coefficients))
+        return _differences(lambda state: azimuthal_operator(at(state)[0], *state[1:], n).pencil(), mode, verdict, known, moved, step)
     choice("control", control, CONTROLS)
     gas = eq.enclosed if control == "gas" else None
     if control == "gas" and gas is None:
@@ -76,8 +85,8 @@ def eigenvalue_rates(
     verdict = _known(axisymmetric_verdict(eq.potential, evaluation, control or "", compliance=compliance))
     pencil = _pencil(eq.potential, evaluation, control, compliance)
     require_simple(pencil, verdict)
-    mode, q = _normal(pencil, verdict), 0.0
-    gradient = evaluation.volume_gradient
+    mode, q = pencil.normalised(evaluation.reduced(np.asarray(verdict.coefficients)))[0], 0.0
+    gradient = evaluation.reduced(evaluation.volume_gradient)
     along = float(gradient @ mode)
     if control == "volume":
         rest = pencil.stiffness(mode) - verdict.smallest_eigenvalue * pencil.times_mass(mode)
@@ -89,6 +98,13 @@ def eigenvalue_rates(
         push = rates.pressure + known.through("chamber.atmosphere")
         total, absolute = eq.volume + gas.chamber, eq.pressure + gas.atmosphere
         extra = -((along / compliance) ** 2) * (room / absolute - total / absolute**2 * push)
+    if eq.scene.bodies:  # elements move with the borders of contact, and their mass with them
+
+        def row_at(state: State) -> Array:
+            there = at(state)[1]
+            return 2 * q * there.reduced(there.volume_gradient)
+
+        return extra + _differences(lambda state: _pencil(*at(state), "pressure", None), mode, verdict, known, moved, step, row_at)
     if evaluation.spring is not None or eq.scene.bending:
         return extra + _by_differences(mode, q, verdict, known, moved, step)
     state, pressure, numbers = known.form(eq.state, eq.pressure, mode, q)
@@ -113,25 +129,24 @@ def _pencil(potential: Potential, evaluation: Evaluation, control: str | None, c
     return axisymmetric_pencil(potential, evaluation, None if form is None else form.at(0), constraint, compliance or 0.0)
 
 
-def _normal(pencil: Pencil, verdict: Verdict) -> Array:
-    mode: Array = np.asarray(verdict.coefficients)
-    return pencil.normalised(mode)[0]
-
-
 def _differences(
-    pencil_at: Callable[[tuple[Scene, Array, float]], Pencil],
+    pencil_at: Callable[[State], Pencil],
+    mode: Array,
     verdict: Verdict,
     known: Sensitive,
     moved: Moved,
     step: Callable[[int], float],
+    row_at: Callable[[State], Array] | None = None,
 ) -> Array:
-    """Of phi.(K - lambda M) phi at the fixed mode and eigenvalue: nothing is solved for."""
+    """Of phi.(K - lambda M) phi, less the product of a row with phi, at the fixed mode and eigenvalue: nothing is solved for."""
     value = verdict.smallest_eigenvalue
-    mode = _normal(pencil_at(moved(0, 0.0)), verdict)
+    mode = pencil_at(moved(0, 0.0)).normalised(mode)[0]
 
     def form(k: int, t: float) -> Array:
-        pencil = pencil_at(moved(k, t))
-        return np.array(mode @ pencil.stiffness(mode) - value * (mode @ pencil.times_mass(mode)))
+        state = moved(k, t)
+        pencil = pencil_at(state)
+        found = mode @ pencil.stiffness(mode) - value * (mode @ pencil.times_mass(mode))
+        return np.array(found if row_at is None else found - row_at(state) @ mode)
 
     return np.array([float(differentiated(lambda t, k=k: form(k, t), step(k))) for k in range(len(known.names))])  # type: ignore[misc]
 

@@ -60,30 +60,31 @@ def axisymmetric_verdict(
         found.mode = held.expanded(found.mode)
         return found
 
-    found = smallest(evaluation)
-    if (free := evaluation.released()) is not None:
-        return _between(found, smallest(free), control, potential)
     shape = partial(mode_shape, potential.space)
+    if (touched := evaluation.touched()) is not None:
+        free, held = touched
+        return between(smallest(held), smallest(free), against(control, 0, potential.electric), control, 0, shape)
+    found = smallest(evaluation)
     # compression that finer meshes do not confirm says that the mesh cannot be trusted
     doubtful = shown is not None and not (bending is not None and bending.positive)
     unresolved = np.inf if doubtful else unresolved_axisymmetric(evaluation, found.mode, bending)
     return verdict_from(found, against(control, 0, potential.electric), control, 0, shape, unresolved)
 
 
-def _between(held: SmallestEigenvalue, free: SmallestEigenvalue, control: str, potential: Potential) -> Verdict:
+def between(held: SmallestEigenvalue, free: SmallestEigenvalue, among: str, control: str | None, n: int, shape: Shape) -> Verdict:
     """The verdict where a body touches and does not press: perturbations may lift the membrane off it, and not push it in.
 
-    The least second variation among these lies between those with the touched points free and held.
+    The least second variation among these lies between those with the touched points free and held. Waves around the axis go both ways
+    from a circle that is touched, so that they need a lift of the whole circle beside them: with the circle free they bound from below.
     """
-    among, shape = against(control, 0, potential.electric), partial(mode_shape, potential.space)
     bounds = f"a body is touched without a force: the smallest eigenvalue is between {free.value:.6g} and {held.value:.6g}"
     if free.value > free.error:
         reason = f"stable: energy rises under all {among}; {bounds}"
-        return Verdict(True, free.value, free.error, control, 0, free.negative, reason, free.mode, shape, 0.0)
+        return Verdict(True, free.value, free.error, control, n, free.negative, reason, free.mode, shape, 0.0)
     if held.value < -held.error:
         reason = f"unstable: energy falls in {held.negative} direction(s) among {among}; {bounds}"
-        return Verdict(False, held.value, held.error, control, 0, held.negative, reason, held.mode, shape, 0.0)
-    return Verdict(None, free.value, held.value - free.value, control, 0, None, f"open among {among}: {bounds}", free.mode, shape, 0.0)
+        return Verdict(False, held.value, held.error, control, n, held.negative, reason, held.mode, shape, 0.0)
+    return Verdict(None, free.value, held.value - free.value, control, n, None, f"open among {among}: {bounds}", free.mode, shape, 0.0)
 
 
 def axisymmetric_pencil(

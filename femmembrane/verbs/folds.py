@@ -99,7 +99,8 @@ def fold_curve(
 
     >>> import femmembrane as fm
     >>> scene = fm.Scene(material=fm.MooneyRivlin(0.05), mesh=fm.disc(8))
-    >>> limit = fm.trace(scene, until={"volume": 10.0}).special_points[0]
+    >>> branch = fm.trace(scene, until={"volume": 10.0})
+    >>> limit = next(point for point in branch.special_points if point.kind == "limit_point")
     >>> curve = fm.fold_curve(scene, start=limit, parameter="material.ratio", bounds=(0.0, 0.06), direction=-1)
     >>> print(f"P = {curve.pressure[0]:.4f} at {curve.values[0]:.2f}, P = {curve.pressure[-1]:.4f} at {curve.values[-1]:.2f}")
     P = 2.1605 at 0.05, P = 1.8792 at 0.00
@@ -344,7 +345,7 @@ def _bounds(parameter: Parameter, bounds: tuple[float, float], direction: int) -
 
 def _check_start(start: SpecialPoint, family: Family) -> None:
     if not isinstance(start, SpecialPoint):
-        raise InputError("start", start, "a special point is allowed, such as fm.trace(scene, ...).special_points[0]")
+        raise InputError("start", start, "a special point is allowed: one of fm.trace(scene, ...).special_points, picked by its kind")
     if start.kind not in KINDS:
         raise InputError("start", start.kind, "a special point of kind " + " or ".join(KINDS) + " is allowed")
     if start.equilibrium.state.shape != (family.space.n_free,):

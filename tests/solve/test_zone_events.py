@@ -144,6 +144,25 @@ def test_over_a_number_and_back():
     assert closes.number == pytest.approx(opens.number, rel=1e-10)
 
 
+@pytest.mark.parametrize(("elements", "degree"), [(8, 4), (16, 4), (8, 6), (64, 2)])
+def test_zones_that_finer_elements_do_not_have_are_not_listed(elements, degree):
+    """A cap above a dipole wrinkles once, near its rim. Coarse meshes show up to four more events, most of them at ends of elements."""
+    scene = wrinkling(8, degree).replace(mesh=fm.cap(0.3, elements))
+    branch = fm.trace(scene, start=1.0854, direction=-1, until={"center_height": -0.9}, max_steps=80)
+    (opens,) = changes(branch)
+    assert (opens.kind, opens.zone.kind, opens.zone.place) == ("zone_opens", "radial", "inside")
+    assert opens.pressure == pytest.approx(0.785738, rel=2e-4)  # that of elements that follow borders, and of 64 of degree 4
+    assert opens.zone.reference_radius == pytest.approx(0.9742, abs=6e-3)
+
+
+def test_no_zone_of_a_state_that_is_slack_on_finer_elements():
+    """Next to the end of a branch that becomes slack, eight elements of degree 6 show a zone in which no tension is left."""
+    scene = wrinkling(8, 6).replace(mesh=fm.cap(0.3, 8), sources=[fm.Dipole(600.0, -3.25)])
+    branch = fm.trace(scene, start=1.0854, direction=-1, until={"center_height": -0.9}, max_steps=80)
+    assert branch.status is fm.Status.SLACK
+    assert [point.zone.kind for point in changes(branch)] == ["radial"]
+
+
 def test_a_scene_without_a_tension_field_has_none():
     branch = fm.trace(wrinkling(8, 2).replace(tension_field=False), start=0.5, direction=-1, max_steps=5)
     assert not changes(branch)

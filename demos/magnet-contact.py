@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
 
-    branch, (on, off) = turns(scene, 40 if options.quick else 200)
+    branch, (on, off) = turns(scene, 50 if options.quick else 200)
     path = loop(scene)
     print("distance     pole    force   radius")
     rows = [(eq.number(OVER) - FACE, eq.center_height, eq.contact.force, eq.contact.radius if eq.contact.touching else 0.0) for eq in path]

@@ -382,7 +382,7 @@ def draw_surroundings(plotter: pyvista.Plotter, scene: Scene, box: Box) -> list[
 def _bodies(around: Surroundings, box: Box) -> Iterator[tuple[Any, dict[str, Any]]]:
     """The parts of bodies with their looks."""
     for body in around.near:
-        look: dict[str, Any] = {"color": "0.6", "opacity": 0.25} if body.rigid else {"color": _SOURCE}
+        look: dict[str, Any] = {"color": "#999999", "opacity": 0.25} if body.rigid else {"color": _SOURCE}
         for part in _parts(body, 0.1 * box.size):
             yield part, look | _STILL | {"smooth_shading": True, "ambient": 0.3}
 

@@ -227,3 +227,19 @@ def test_words_at_the_top_have_room() -> None:
             height = (points - np.array(camera.focal_point)) @ np.array(camera.up) / (2 * camera.parallel_scale) + 0.5
         assert height.min() == pytest.approx(0.11)
         assert height.max() == pytest.approx(1 - 0.11 - words)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [fm.Plane(0.5), fm.Ball(0.9, 0.4), fm.Cylinder(0.5, 0.9, 0.3), fm.Mould(points=[(1.2, 0.1), (0.6, 0.5), (0.6, 1.0)])],
+    ids=["plane", "ball", "cylinder", "mould"],
+)
+def test_a_rigid_body_is_drawn(body: object, tmp_path: Path) -> None:
+    """A grey body, whatever it is: pixels change beside the picture without it."""
+    scene = fm.Scene(fm.NeoHookean(), mesh=fm.disc(8))
+    bare, beside = (fm.inflate(s, volumes=[0.3]) for s in (scene, scene.replace(obstacles=[body])))
+    seen = []
+    for k, found in enumerate((bare, beside)):
+        fm.view(found, screenshot=tmp_path / f"{k}.png", size=SMALL)
+        seen.append(pyvista.read_texture(tmp_path / f"{k}.png").to_array())
+    assert (seen[0] != seen[1]).any(axis=-1).mean() > 0.02

@@ -78,7 +78,7 @@ class Charged:
         like = self._potential._like
         if like is not None and like.charged is not None:
             known = like.charged._kernel
-            return Replay(known.function, self._potential.point_data, known)
+            return Replay(known.function, self._potential.point_data, known.vectors)
         data, local, parameters = self._potential.symbols
         capacitance, slope, gradient = self.expressions
         rows = [capacitance, slope, ca.jacobian(capacitance, parameters[1]), gradient]

@@ -31,10 +31,11 @@ class PointProgram:
     def __init__(self, function: ca.Function, data: Array, like: PointProgram | None = None) -> None:
         self.function, self.data, self._like = function, data, like
         self._tapes: dict[tuple[str, ...], Tape | None] = {}
+        self._vectors: dict[tuple[int, int], ca.Function] = {} if like is None else like._vectors
 
     @cached_property
     def _replay(self) -> Replay:
-        return Replay(self.function, self.data, None if self._like is None else self._like._replay)
+        return Replay(self.function, self.data, self._vectors)
 
     def replay(self, local: Array, parameters: Array) -> Array:
         """Values at all points, shape (rows, n)."""
@@ -53,17 +54,20 @@ class PointProgram:
 class Replay:
     """A point function replayed on vectors of points, called through preallocated buffers.
 
-    ``like`` is one of the same function on as many other points, whose instructions it shares.
+    ``vectors`` are the instructions of the same function, by the numbers of points in a block and of blocks: those that others have built
+    are shared, and new ones are put there.
     """
 
     @BUILDING
-    def __init__(self, function: ca.Function, data: Array, like: Replay | None = None) -> None:
+    def __init__(self, function: ca.Function, data: Array, vectors: dict[tuple[int, int], ca.Function] | None = None) -> None:
         n, self.function = data.shape[1], function
         self.block = min(n, _BLOCK)
         self.n_blocks = -(-n // self.block)
         self.n, self.rows = n, function.numel_out(0)
-        vector: Any = self._vectorised() if like is None else like._vector
-        self._vector: Any = vector
+        self.vectors, key = {} if vectors is None else vectors, (self.block, self.n_blocks)
+        if key not in self.vectors:
+            self.vectors[key] = self._vectorised()
+        vector: Any = self.vectors[key]
         self._data = self._split(data)
         self._local = np.ones((self.n_blocks, function.numel_in(1), self.block))
         self._parameters = np.zeros(function.numel_in(2))

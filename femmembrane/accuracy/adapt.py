@@ -65,31 +65,6 @@ _IN_CONTACT = 0.5
 _LEAST_DENSITY = 0.1
 
 
-def choose_mesh(scene: Scene, follow: Follow, control: str) -> Scene:
-    """The scene on a mesh with errors of P and of the total energy below the accuracy that its open mesh asks for.
-
-    Errors are compared at the same volume, and in a run by heights at the same pole height. With arc length the smaller of both counts,
-    since it is regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run,
-    and over the sum of the sizes of all energies. States without an estimate (compressed, slack) do not count.
-
-    Parameters
-    ----------
-    scene : Scene
-        Open: its mesh has an accuracy and no elements.
-    follow : callable
-        What is wanted, or a part of it that shows how hard it is, on a scene with a mesh; it returns what it reached.
-    control : {"volume", "pressure", "center_height", "arc-length"}
-        How it is wanted.
-
-    Raises
-    ------
-    SolveError
-        With status ACCURACY_NOT_MET when no mesh is good enough, with that of the run when it yields nothing on a trial mesh.
-    """
-    trial = trial_of(scene, follow, control)
-    return Choice(scene, trial, accuracy_of(scene)).chosen()
-
-
 def graded(s: Array, density: Array, elements: int, corners: ArrayLike = ()) -> tuple[float, ...]:
     """Ends of elements that share a density, given at points s along the meridian, evenly; with an end at every corner."""
     mass = np.append(0.0, np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(s)))

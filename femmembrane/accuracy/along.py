@@ -35,6 +35,8 @@ _SHARE_AHEAD, _ROUND_OFF = 0.05, 1e-12
 _CHANGED, _TOO_FINE = 0.4, 3.0
 #: how often a mesh is graded again by itself, and its size over that of the mesh that graded it from which on it is
 _REGRADED, _MUCH_LARGER = 2, 1.6
+#: states after which a much smaller mesh is looked for
+_OFTEN = 8
 
 
 @dataclass(frozen=True)
@@ -119,14 +121,47 @@ class Along:
         )
         raise SolveError(message, status=Status.ACCURACY_NOT_MET)
 
-    def smaller(self, scene: Scene, potential: Potential, state: State, share: float) -> Scene | None:
+    def next_mesh(self, scene: Scene, potential: Potential, state: State, share: float, done: int) -> Scene | None:
+        """The scene on another mesh for a state and the next ones, where this one is nearly used up for it, or much too fine.
+
+        Parameters
+        ----------
+        scene : Scene
+            With the mesh of the state.
+        potential : Potential
+        state : State
+        share : float
+            See :meth:`share`.
+        done : int
+            How many states came before: a much smaller mesh is looked for at times only.
+
+        Returns
+        -------
+        Scene or None
+            None where the mesh at hand will do, or does as well as any.
+
+        Raises
+        ------
+        SolveError
+            With status ACCURACY_NOT_MET when no mesh is good enough, this one included.
+        """
+        try:
+            if self._full(scene, share):
+                return self.mesh_for(scene, potential, state, share)
+            return self._smaller(scene, potential, state, share) if done % _OFTEN == 0 else None
+        except SolveError:
+            if share > self.most:
+                raise
+            return None
+
+    def _smaller(self, scene: Scene, potential: Potential, state: State, share: float) -> Scene | None:
         """The scene on a much smaller mesh that would do, None where there is none."""
         if share > _SHARE_AHEAD * _TOO_FINE ** (-2.0 * scene.degree) or scene.mesh.elements < FEWEST_ALONG * _TOO_FINE:
             return None
         found = self.mesh_for(scene, potential, state, share)
         return found if _TOO_FINE * found.mesh.elements <= scene.mesh.elements else None
 
-    def full(self, scene: Scene, share: float) -> bool:
+    def _full(self, scene: Scene, share: float) -> bool:
         """Whether the error of a state has come near to the accuracy, and a larger mesh than that of the scene is allowed."""
         return share > (_CHANGED if scene.mesh.elements < _MOST_ALONG else self.most)
 
@@ -151,11 +186,42 @@ class Shortfall:
 def choose_and_check(
     scene: Scene, follow: Follow, control: str, changes: bool = False, every: bool = True
 ) -> tuple[Scene, Shortfall | None, Along | None]:
-    """As :func:`choose_mesh`, with the errors of the run on the chosen mesh estimated and, where they are too large, the mesh chosen again.
+    """The scene on a mesh with errors of P and of the total energy below the accuracy that its open mesh asks for, all along a run.
 
-    A few states of a trial do not stand for a whole run: a run that ends in a spike below a source becomes harder without end. Where the
+    Errors are compared at the same volume, and in a run by heights at the same pole height. With arc length the smaller of both counts,
+    since it is regular at volume folds. Relative means over the pressure, but not over less than a hundredth of the largest one of the run,
+    and over the sum of the sizes of all energies. States without an estimate (compressed, slack) do not count.
+
+    The mesh is chosen by a trial run. The errors of the run on it are estimated and, where they are too large, the mesh is chosen again. A
+    few states of a trial do not stand for a whole run: a run that ends in a spike below a source becomes harder without end. Where the
     mesh may change along the run, and one of moderate size does not keep the accuracy, the mesh is that of the first state, with what is to
     change it. So it is where what was followed is not ``every`` state of the run, and ended early: states beyond it were never seen.
+
+    Parameters
+    ----------
+    scene : Scene
+        Open: its mesh has an accuracy and no elements.
+    follow : callable
+        What is wanted, or a part of it that shows how hard it is, on a scene with a mesh; it returns what it reached.
+    control : {"volume", "pressure", "center_height", "arc-length"}
+        How it is wanted.
+    changes : bool
+        Whether the mesh may change along the run.
+    every : bool
+        Whether ``follow`` has all states of the run.
+
+    Returns
+    -------
+    scene : Scene
+    shortfall : Shortfall or None
+        Where the accuracy ends; None where it is kept all along.
+    along : Along or None
+        What changes the mesh along the run; None for a run on one mesh.
+
+    Raises
+    ------
+    SolveError
+        With status ACCURACY_NOT_MET when no mesh is good enough, with that of the run when it yields nothing on a trial mesh.
     """
     controls = controls_of(control)
     first, found = trial_of(scene, follow, control), None

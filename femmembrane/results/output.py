@@ -79,10 +79,14 @@ def write_run(
     NotWrittenError
         When some files could not be written (a full disk); all others were.
     """
-    folder = _writable(Path(directory))
+    return _write_folder(Path(directory), _writers(branch, command, units))
+
+
+def _write_folder(directory: Path, writers: Mapping[str, Callable[[Path], object]]) -> list[Path]:
+    """Write files to a folder, the record last and only if all others were, and remove those of an earlier run that are not among them."""
+    folder = _writable(directory)
     names = run_files()
     refuse_obstacles(folder, names, (SURFACES_FOLDER,))
-    writers = _writers(branch, command, units)
     for stale in {*names} - (writers.keys() - {RECORD}):
         (folder / stale).unlink(missing_ok=True)
     if SURFACES not in writers:
@@ -123,23 +127,17 @@ def write_tipped_run(branch: TippedBranch, directory: str | os.PathLike[str], co
     Raises
     ------
     InputError
-        When the folder cannot be made or written to.
+        When the folder cannot be made or written to, or a folder or a link in it stands in the way.
+    NotWrittenError
+        When some files could not be written (a full disk); all others were.
     """
-    folder = _writable(Path(directory))
-    refuse_obstacles(folder, run_files(), (SURFACES_FOLDER,))
-    for stale in run_files():
-        (folder / stale).unlink(missing_ok=True)
-    door.remove_surfaces(folder / SURFACES)
-    writers: dict[str, Callable[[Path], object]] = {"branch.nc": branch.save, "branch.csv": branch.to_csv}
+    writers: dict[str, Callable[[Path], object]] = {"branch.nc": branch.save, "branch.csv": branch.to_csv, DIAGRAMS[0]: branch.plot}
     if branch.special_points is not None:
         writers["special_points.csv"] = partial(write_points_csv, branch)
-    writers[DIAGRAMS[0]] = branch.plot
     if branch.scene.vtu:
         writers[SURFACES] = branch.to_vtk
     writers[RECORD] = lambda path: _write_json(_facts(branch, command), path)
-    for name, write in writers.items():
-        write(folder / name)
-    return [folder / name for name in run_files() if name in writers]
+    return _write_folder(Path(directory), writers)
 
 
 def read_record(folder: Path) -> dict[str, Any] | None:

@@ -34,9 +34,6 @@ from .meshing import carried
 from .running import End, Request, Run
 from .state_records import OnStep, predictor_of, record_on_borders, remembered, restore, resume, special_point
 
-#: loads after which a much smaller mesh is looked for
-_OFTEN = 8
-
 
 @dataclass(frozen=True, eq=False)
 class LoadRequest(Request):
@@ -210,11 +207,7 @@ class LoadRun(Run[Branch]):
         if not state.x.any():
             return state
         along = along.reached(self.found, state)
-        share = along.share(self.potential, state)
-        if along.full(self.here, share):
-            scene = self._mesh_for(along, state, share)
-        else:
-            scene = along.smaller(self.here, self.potential, state, share) if len(self.found) % _OFTEN == 0 else None
+        scene = along.next_mesh(self.here, self.potential, state, along.share(self.potential, state), len(self.found))
         if scene is None:
             return state
         before, memory, load = self.potential, self.path.memory, self.path.load
@@ -223,15 +216,6 @@ class LoadRun(Run[Branch]):
         self._stand_on(scene)
         self.path.go_on(there, load, carried_path(memory, before.space, self.potential.space))
         return there
-
-    def _mesh_for(self, along: Along, state: State, share: float) -> Scene | None:
-        """A mesh for a state; None where there is none and the one at hand will do."""
-        try:
-            return along.mesh_for(self.here, self.potential, state, share)
-        except SolveError:
-            if share > along.most:
-                raise
-            return None
 
     def _stand_on(self, scene: Scene) -> None:
         """Have the mesh of a scene from here on."""

@@ -49,8 +49,6 @@ from .targets import in_words, place_of, turned_back, value_in_words
 #: distance from a value at which a trace ends, in units of the membrane, that is none
 _AT_TARGET = 1e-9
 
-#: steps after which a much smaller mesh is looked for
-_OFTEN = 8
 #: most numbers of waves that are tried one after the other for the first onset of all
 _MOST_WAVES = 20
 if TYPE_CHECKING:
@@ -409,10 +407,9 @@ class TraceRun(Run[Branch]):
         """Another mesh for the steps to come, where this one is nearly used up or much too fine; the same one where there is none."""
         along = along.reached(self.found, self.point.state)
         with self.timed("mesh"), contextlib.suppress(SolveError):
-            if along.full(self.here, share):
-                self._go_over(along.mesh_for(self.here, self.potential, self.point.state, share), alike=True)
-            elif self.regular % _OFTEN == 0 and (smaller := along.smaller(self.here, self.potential, self.point.state, share)) is not None:
-                self._go_over(smaller, alike=True)
+            scene = along.next_mesh(self.here, self.potential, self.point.state, share, self.regular)
+            if scene is not None:
+                self._go_over(scene, alike=True)
 
     def _go_over(self, scene: Scene, *, alike: bool = False) -> None:
         """Stand at the last point on another mesh, whose record takes the place of the one before; where a fold lies between the two and

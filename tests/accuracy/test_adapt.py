@@ -333,7 +333,7 @@ def test_states_that_depend_on_the_mesh():
         return branch[first : first + 1]
 
     with pytest.raises(fm.SolveError, match=r"mesh\.accuracy = 1e-06: no error can be estimated") as e:
-        adapt.choose_mesh(scene, compressed, "height")
+        along.choose_and_check(scene, compressed, "height")
     assert e.value.status is fm.Status.ACCURACY_NOT_MET
 
 
@@ -503,7 +503,7 @@ def test_an_interrupted_run_keeps_its_mesh(branch):
 
 
 def test_off_means_off(monkeypatch):
-    monkeypatch.setattr(adapt, "choose_mesh", None)
+    monkeypatch.setattr(along, "choose_and_check", None)
     scene = disc_scene(OGDEN, elements=8)
     assert not scene.open
     assert len(fm.inflate(scene, volumes=[1.0, 2.0])) == 2

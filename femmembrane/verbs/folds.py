@@ -111,14 +111,12 @@ def fold_curve(
     check_ill_posed(ill_posed)
     check_max_steps(max_steps)
     request = FoldRequest(start, named, (low, high), direction, int(max_steps), steps or _STEPS, ill_posed)
-    clock, shortfall = time.perf_counter(), None
+    clock, shortfall, spent = time.perf_counter(), None, {}
     if scene.open:
         scene, request, shortfall = _on_chosen_mesh(scene, request)
+        spent = {"mesh": time.perf_counter() - clock}
     run = FoldRun(scene, request)
-    run.timings, run.shortfall = (
-        {**({"mesh": time.perf_counter() - clock} if scene.mesh != named.scene.mesh else {}), **run.timings},
-        shortfall,
-    )
+    run.timings, run.shortfall = spent | run.timings, shortfall
     curve = run.follow()
     if throw and curve.message:
         raise SolveError(curve.message, status=curve.status, result=curve)
